@@ -218,7 +218,9 @@ pub enum Warning {
         iri: String,
         /// Kind inferred from the use of the entity.
         kind: &'static str,
-        /// Position of the first occurrence, if a document contains the IRI literally.
+        /// Position of the first occurrence of the whole IRI, or of its local name after `:` or `#`. The occurrence can
+        /// belong to another prefix. `None` if no document contains either, or if this warning is not among the first
+        /// 100.
         position: Option<Position>,
     },
     /// O202: a statement that is not part of any OWL axiom or SWRL rule.

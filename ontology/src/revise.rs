@@ -1,11 +1,13 @@
 //! Computes the delta that updates the rule engine when documents are asserted and retracted. After the
 //! update, the engine holds exactly the consequences of the remaining statements.
 //!
-//! [`Stated`] keeps the stated axioms and rules. [`lower_together`], which also translates a new
-//! knowledge base, translates them to facts and rules before and after the change. The engine receives
-//! the differences between the two results. A change that consists of assertions about named classes and
-//! properties skips these translations, unless rules depend on the set of stated names, or the change declares a class
-//! or property and names can be equal.
+//! [`Stated`] keeps the stated axioms and rules. [`lower_together`] translates them to facts and rules, once before
+//! and once after the change. The engine receives the differences between the two results.
+//!
+//! The translations are skipped if the change consists only of assertions about named individuals, classes and
+//! properties. They are needed nevertheless in the following cases. A rule derives members of `owl:Thing`, which
+//! depend on all stated names. The change declares a class or property while the engine reasons about equality
+//! (`owl:sameAs`). An individual of the change is also declared as a class or property.
 //!
 //! Axioms form a set: an axiom of two documents is stated once, and one retraction removes it. Declarations are
 //! never retracted, because many documents repeat them.

@@ -322,8 +322,8 @@ fn check(seeds: std::ops::Range<u64>, equalities: bool) {
     }
 }
 
-/// Returns `true` if two statements differ only in the order of their words, in inverses or in numeric
-/// spelling.
+/// Returns `true` if two statements differ only in the order of their words, in occurrences of `ObjectInverseOf`, or in
+/// the spelling of numbers (`1.0` or `1`, decimal or integer).
 fn alike(first: &str, second: &str) -> bool {
     let words = |text: &str| -> Vec<String> {
         let mut words: Vec<String> = text

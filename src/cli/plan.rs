@@ -362,8 +362,8 @@ fn show(
         }
         PlanFormat::Btcpp => planned.written().map(|plan| btcpp_text(mission, &plan)),
         PlanFormat::Plansys2 => planned.spaced().map(|plan| popf_text(&plan_lines(&plan))),
-        // Plans for `validate` include the designs; plans for the user's own domain do not, as its
-        // actions have no such parameters.
+        // In this format, which `validate` reads, designs that the knowledge base has added are arguments. The other
+        // formats for plans are for the domain as the user wrote it, so `written` and `spaced` omit these arguments.
         PlanFormat::Ipc => planned.solution.plan.as_ref().map(Plan::to_string),
     }
 }

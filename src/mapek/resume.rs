@@ -48,7 +48,7 @@ pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational)
         // The copy requires that the gate fact does not hold, and adds this fact. So the remainder occurs exactly once.
         require(&mut copy, Condition::Not(Box::new(Condition::Atom(gate()))));
         open(&mut copy);
-        // The copy comes first: among schemas with the same name, the first applicable one is used.
+        // The copy comes first: if no schema of this name can start, the validator reports the violation of the copy.
         gated.actions.insert(0, copy);
     }
     gated

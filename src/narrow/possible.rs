@@ -38,9 +38,10 @@ pub(super) struct Possible {
 
 impl Possible {
     /// Determines which open predicates (predicates that actions can change) get a bound. A predicate has no bound if
-    /// one of its axioms is not a clause or leaves a variable unbound, or if the domain has a predicate with the
-    /// name of the companion. Predicates that timed initial literals change have no bound. If an action adds the predicate, each argument must be a constant, or a parameter for which the
-    /// action requires a class. A predicate that depends on a predicate without bound has no bound, either.
+    /// one of its axioms is not a clause or leaves a variable unbound, or if the domain has a predicate with the name
+    /// of the companion. Predicates that timed initial literals change have no bound. If an action adds the predicate,
+    /// each argument must be a constant, or a parameter for which the action requires a class. A predicate that depends
+    /// on a predicate without bound has no bound, either.
     pub fn new(
         domain: &Domain,
         open: &BTreeMap<Name, Option<Vec<Clause>>>,

@@ -5,9 +5,9 @@
 //! (PDDL 2.1, PDDL 2.2) and share no code with the planner, not even the parser: a generator has its own task
 //! structure, which is printed as PDDL.
 //!
-//! Environment variables: `ORACLE_FROM` is the first seed, `ORACLE_TASKS` the number of tasks, `ORACLE_SAVE` a directory for the files
-//! of failing tasks, `ORACLE_FRONTS` one for the certificates of fronts. If `ORACLE_STOP` is set, a run ends at the first failure. `mutants.toml` lists faults of the planner that the
-//! oracles must detect.
+//! Environment variables: `ORACLE_FROM` is the first seed, `ORACLE_TASKS` the number of tasks, `ORACLE_SAVE` a
+//! directory for the files of failing tasks, `ORACLE_FRONTS` one for the certificates of fronts. If `ORACLE_STOP` is
+//! set, a run ends at the first failure. `mutants.toml` lists faults of the planner that the oracles must detect.
 
 // Readability of the oracles matters more than their speed.
 #![allow(clippy::format_collect, clippy::format_push_string, clippy::needless_for_each)]

@@ -35,8 +35,9 @@ pub struct Robot {
     pub place: String,
     /// Numbers of effects that were carried out, refused, or superseded before their arrival.
     pub processed: BTreeSet<u64>,
-    /// Reconfigurations that were refused since the last successful one. If the successful one failed after its
-    /// acknowledgement, it is included, and so are those refused before it.
+    /// Reconfigurations that were refused since the last successful one. If this one fails after its acknowledgement,
+    /// it counts as refused, too. Then the list again contains the reconfigurations that were refused before it
+    /// (`refused_before`).
     pub refused: BTreeSet<u64>,
     refused_before: BTreeSet<u64>,
     /// Answers to effects, reports of late failures, and reports of ended actions, kept for repetition.

@@ -4,8 +4,8 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Pow, Signed, Zero};
 
-/// Maximum number of digits of a number written without exponent. The limit exceeds any measurement precision and
-/// prevents a short text such as `1e999999999` from filling the memory.
+/// Maximum number of digits that a number has when its exponent is expanded: `1e3` counts as `1000`, four digits. The
+/// limit exceeds any measurement precision. It prevents a short text such as `1e999999999` from filling the memory.
 const MAX_DIGITS: usize = 400;
 
 #[derive(Debug, Clone, PartialEq)]

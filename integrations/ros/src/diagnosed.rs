@@ -1,5 +1,6 @@
-//! Converts diagnostics to input lines of the adaptation loop: statuses of the monitors of MROS, ROSA and PLANTA on
-//! `/diagnostics`, diagnostics of drivers there by the rules of `ros.toml`, and signals.
+//! Converts diagnostics to input lines of the adaptation loop. There are three sources: on `/diagnostics`, the statuses
+//! of the monitors of MROS, ROSA and PLANTA; also on `/diagnostics`, diagnostics of drivers, which the rules of
+//! `ros.toml` translate; and signals.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;

@@ -39,8 +39,8 @@ impl Decimal {
         }
     }
 
-    /// Parses a decimal number such as `-12.50`, or `1e-05` in the form of Python's decimals. Returns `None`
-    /// for an invalid form, and for an exponent beyond ±1000.
+    /// Parses a decimal number such as `-12.50`. An exponent is accepted, too, because Python programs write decimals
+    /// such as `1e-05`. Returns `None` if the form is invalid, or if the absolute value of the exponent is above 1000.
     pub fn parse(lexical: &str) -> Option<Self> {
         let (mantissa, exponent) = match lexical.find(['e', 'E']) {
             Some(position) => (&lexical[..position], lexical[position + 1..].parse::<i64>().ok()?),

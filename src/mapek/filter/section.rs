@@ -25,11 +25,11 @@ pub(crate) type MeasuredsSection = BTreeMap<String, MeasuredSection>;
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ComponentSection {
-    /// `confirm_time` of this component.
+    /// Seconds for which this component must report a failure before it takes effect. Default: `adaptation.confirm_time`.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     confirm_time: Number,
-    /// `heal_time` of this component.
+    /// Seconds for which this component must report that it works before it counts as recovered. Default: `adaptation.heal_time`.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     heal_time: Number,

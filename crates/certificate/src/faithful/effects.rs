@@ -77,7 +77,8 @@ struct Variable<'v> {
     own: u32,
     case: &'v Case,
     effects: Vec<&'v (Formula, Key, bool)>,
-    /// The atoms of the variable that the case may change, by their values.
+    /// Atoms of the variable that the case may add or delete. The key is the value of the variable that represents the
+    /// atom.
     touched: BTreeMap<u32, &'v Key>,
     certain: Option<u32>,
     conditional: Vec<(Formula, u32)>,

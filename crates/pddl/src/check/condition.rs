@@ -204,7 +204,8 @@ impl<'a> Checker<'a> {
             Term::Variable(identifier) => (identifier.span, format!("?{}", identifier.name)),
             Term::Constant(identifier) => (identifier.span, identifier.name.to_string()),
         };
-        // Untyped files, in particular generated ones, use untyped objects everywhere.
+        // A mismatch is only a warning if the object has no type. Generated files often pass objects without a type to
+        // typed parameters.
         let is_untyped = match argument {
             ArgumentType::Variable(_) => false,
             ArgumentType::Object(types) => types.iter().all(|r#type| is_object(r#type)),

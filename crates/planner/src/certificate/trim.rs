@@ -4,7 +4,8 @@
 //! this propagation become the hints of the derived clause. Literals that are permanently implied become unit
 //! clauses, which keeps hints short. Only clauses on which the empty clause depends are written.
 //!
-//! The result is checked again by the crate `certificate`, which shares no code with this file.
+//! The result is checked again by the crate `certificate`. The checker has its own propagation, which follows the
+//! hints. Both use the same reader and writer of clauses (`certificate::lines`).
 //!
 //! \[1\] L. Cruz-Filipe, M. Heule, W. Hunt, M. Kaufmann, P. Schneider-Kamp: Efficient certified RAT
 //! verification, CADE 2017.

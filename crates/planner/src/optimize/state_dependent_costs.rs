@@ -1,5 +1,6 @@
-//! Exact costs of paths, and lower bounds on them, for a metric whose fluents change by amounts that depend on the
-//! state \[1\], here without a decomposition of the costs. `branch_and_bound` minimises such a metric.
+//! Exact costs of paths for a metric whose fluents change by amounts that depend on the state \[1\]. Lower bounds on
+//! the cost of each operator serve the heuristics. Unlike in \[1\], the cost functions are not decomposed.
+//! `branch_and_bound` minimises such a metric.
 //!
 //! The cost of a path is the sum of its operator costs plus the weighted values of the measured fluents (fluents of the
 //! metric) in its last state. Each operator has a lower bound on the increase of this cost, over the intervals of all

@@ -1,5 +1,7 @@
-//! Numbers without an initial value: random tasks are compared with all plans up to a maximum length,
-//! executed with possibly undefined values. Planner and validator must agree with this.
+//! Tests of numbers without an initial value, on random tasks. A reference implementation executes plans with possibly
+//! undefined values, and enumerates all plans up to a maximum length. The planner must find a plan if one of these is
+//! valid, and no optimal plan may be longer than the shortest of them. The validator must accept exactly the plans that
+//! the reference implementation can execute and that reach the goal.
 
 mod model;
 

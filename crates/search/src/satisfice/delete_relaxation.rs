@@ -69,7 +69,7 @@ pub(super) struct Relaxation<N> {
     pub(super) supports: Vec<Vec<Achiever>>,
     /// For each proposition: the nodes that have it as a condition.
     pub(super) waiting: Lists,
-    /// `true` for the unconditional part of an operator.
+    /// For each node: `true` if it is the unconditional part of an operator.
     pub(super) is_base: Vec<bool>,
     pub(super) goals: Vec<Proposition>,
 }

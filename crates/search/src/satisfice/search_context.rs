@@ -16,8 +16,8 @@ use crate::satisfice::landmarks::Landmarks;
 use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::{MutexPairs, SearchStatistics, is_monotone};
 
-/// Divisor of the memory limit in bytes. A search ends if `Search::size` exceeds the quotient, i.e. if what is
-/// counted there takes more than half of the available memory.
+/// A search ends if `Search::size` exceeds the memory limit in bytes divided by this number. `Search::size` counts
+/// words of 8 bytes. So a search may use at most half of the memory limit.
 pub(super) const MEMORY_SHARE: usize = 16;
 /// Work units charged for generating a successor and looking it up in the store.
 pub(super) const GENERATION_COST: u64 = 200;

@@ -18,10 +18,11 @@ pub(super) fn mark_fluents(lifted: &mut Lifted) {
     for (predicate, ..) in lifted.events.iter().flat_map(|event| &event.changes) {
         lifted.predicates[predicate.index()].fluent = true;
     }
-    // The Datalog engine evaluates a universal quantifier by negation, which must be stratified. Derived predicates
-    // that depend on themselves through a universal quantifier are therefore treated as fluents. So are derived
-    // predicates with comparisons below a universal quantifier: if a value is undefined, neither the comparison nor its
-    // negation is true.
+    // The Datalog engine evaluates a universal quantifier as a negated existential one, and negation must be
+    // stratified. Derived predicates that depend on themselves through a universal quantifier are therefore treated as
+    // fluents. Derived predicates with a comparison below a universal quantifier are treated as fluents for another
+    // reason. If a value is undefined, neither the comparison nor its negation is true, so the double negation would be
+    // wrong.
     let compares = lifted.axioms.iter().filter(|axiom| compares_for_all(&axiom.condition, false));
     let compares: Vec<_> = compares.map(|axiom| axiom.predicate).collect();
     for predicate in recursive_through_forall(lifted).into_iter().chain(compares) {

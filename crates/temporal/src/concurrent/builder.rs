@@ -187,7 +187,9 @@ impl<'a> Builder<'a> {
             let placed = |error: Error| error.within(&format!("`{}`", schema.name), Some(schema.place));
             let factor = |timer| unit.factor::<T>(task, timer, divisor).map(|factor| (timer, factor));
             let is_chosen = self.split.chosen[key.0];
-            // No start sets a chosen duration, but every end clears it.
+            // The duration variable is found in the effects of an operator. A start assigns the duration only if it
+            // depends on the state. If the planner chooses the duration, only the end assigns the variable: it resets
+            // it to 0.
             let timer = timer(task, if is_chosen { end } else { start });
             let timer = timer.map(factor).transpose().map_err(placed)?;
             // A duration that depends on the state is compared with the separation when the action

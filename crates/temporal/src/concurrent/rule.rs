@@ -17,8 +17,8 @@ pub(super) struct Rule {
     /// Over-all conditions of the action, ascending. Empty except for ends of actions in
     /// [`TemporalRelaxation::admissible`](super::temporal_relaxation::TemporalRelaxation::admissible).
     pub(super) over_all: Vec<Proposition>,
-    /// Facts to which the happening certainly sets their variables, so that other values are
-    /// deleted. Empty for clauses and derived facts.
+    /// Facts that certainly hold after the rule, because the happening sets their variables. All other values of these
+    /// variables are deleted. Empty for clauses and derived facts.
     pub(super) sets: Vec<Proposition>,
     /// Numeric conditions whose expressions the rule may increase.
     pub(super) raises: Vec<NumericEffect>,

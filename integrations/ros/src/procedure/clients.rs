@@ -69,7 +69,7 @@ struct Observed {
 pub(super) struct Clients {
     nodes: BTreeMap<String, NodeClient>,
     node: Arc<Node>,
-    /// Clients by service and full name of the request.
+    /// Clients by service name and full name of the request type.
     services: BTreeMap<(String, String), Caller<AnyService>>,
     topics: BTreeMap<String, Arrivals>,
     /// Topics by name and full name of the type.

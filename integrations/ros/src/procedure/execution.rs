@@ -131,10 +131,14 @@ impl Procedures {
         missing.into_iter().min_by_key(Vec::len).unwrap_or_default()
     }
 
-    /// Returns the mode whose conditions hold. If several modes qualify, those with the most
-    /// conditions are considered. Of these, the mode that was put into effect or seen last is
-    /// returned. If the last mode has no observable conditions, it is returned unchecked. The
-    /// result is [`Seen::Unsettled`] while a procedure runs or a node does not answer.
+    /// Determines the mode of a function from the conditions of its modes.
+    ///
+    /// The result is [`Seen::Unsettled`] while a procedure runs or a node does not answer. If the last mode (put into
+    /// effect or seen) has no observable conditions, it is returned unchecked. Otherwise, the mode is returned whose
+    /// conditions hold. Of several such modes, those with the most conditions are considered. If more than one remains,
+    /// the last mode is returned if it is one of them; otherwise, the result is [`Seen::Ambiguous`]. If the conditions
+    /// of no mode hold, the result is [`Seen::Nothing`], or [`Seen::Ambiguous`] if the last mode is unknown and some
+    /// mode has no observable conditions.
     pub(crate) async fn observe(&self, function: &str) -> Seen {
         let Some(procedures) = self.functions.get(function) else { return Seen::Ambiguous };
         // In the middle of a procedure, an observation would be meaningless.

@@ -245,8 +245,9 @@ fn refinements(
             let free = (0..arguments.len()).find(|p| arguments[*p] == *object && !positions.contains(p));
             positions.extend(free);
         }
-        // Atoms that represent running actions may have any number of arguments outside the key. Such an atom
-        // replaces the value of the variable at the start of the action.
+        // A predicate of the group has at most one argument outside the key. Atoms that represent running actions are
+        // an exception: their arguments are all parameters of the action. From the start of the action, such an atom is
+        // the value of the variable.
         let is_running = task.world.lifted.predicates.get(predicate.index()).is_some_and(|p| p.running);
         if positions.len() == key.len() && (arguments.len() <= key.len() + 1 || is_running) {
             let mut parts = candidate.clone();

@@ -49,8 +49,9 @@ pub(super) enum Operand {
     /// evaluated separately for each instance.
     Closed,
     Undefined,
-    /// The operand mentions slots. The second field holds the combinations of designs for which the operand
-    /// is undefined; it is empty for an unconditional effect, which forbids these combinations instead.
+    /// The operand mentions slots. The second field holds the combinations of designs for which the operand is
+    /// undefined; with them, only the conditional effect is undefined. For an unconditional effect, the field is empty,
+    /// because the action is not applicable with such a combination (see [`SharedInstanceData::forbidden`]).
     Open(Linear<Rational>, Arc<[ForbiddenCombinations]>),
 }
 
