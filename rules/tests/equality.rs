@@ -275,8 +275,8 @@ fn swap_pairs(scripts: u64, exchanges_rules: bool) {
 
 #[test]
 fn swapped_pairs_match_evaluation_from_scratch() {
-    swap_pairs(200, false);
-    swap_pairs(200, true);
+    swap_pairs(100, false);
+    swap_pairs(100, true);
 }
 
 #[test]

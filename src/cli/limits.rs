@@ -72,7 +72,7 @@ impl Guard {
             return Err(Failure::usage(Message::error("M115", text)));
         }
         if let Some(megabytes) = memory {
-            // The search may use half of the memory limit; formulas and ground tasks take the other half.
+            // A* may use half of the memory limit. The satisficing search, and the improvement of a plan, may each use half of that again.
             let half = usize::try_from(megabytes).unwrap_or(usize::MAX).saturating_mul(1 << 19);
             limits = limits.with_room(half);
         }

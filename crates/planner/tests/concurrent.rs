@@ -412,7 +412,7 @@ fn all_agree(seeds: std::ops::Range<u64>) {
 
 #[test]
 fn plans_are_as_good_as_the_validator_admits() {
-    all_agree(0..120);
+    all_agree(0..70);
 }
 
 /// Every search takes part from the first node on. In half of the tasks, all actions with a duration use one
@@ -426,7 +426,7 @@ fn all_searches_agree(seeds: std::ops::Range<u64>) {
 
 #[test]
 fn no_search_claims_more_than_the_validator_admits() {
-    all_searches_agree(0..100);
+    all_searches_agree(0..60);
 }
 
 #[test]

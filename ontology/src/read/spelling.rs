@@ -9,11 +9,11 @@ use crate::error::{Error, Position, Warning};
 const MAX_SEARCHES: usize = 100;
 
 /// Sets the position of each warning about an undeclared name to the first occurrence of the name in the
-/// documents. Considers only the first [`MAX_SEARCHES`] warnings.
+/// documents. Considers only the first [`MAX_SEARCHES`] of them.
 pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
     let undeclared = |warning: &&mut Warning| matches!(warning, Warning::Undeclared { .. });
     let mut unlocated: Vec<&mut Warning> =
-        warnings.iter_mut().take(MAX_SEARCHES).filter(undeclared).collect();
+        warnings.iter_mut().filter(undeclared).take(MAX_SEARCHES).collect();
     for (name, text) in texts {
         if unlocated.is_empty() {
             return;

@@ -196,12 +196,14 @@ impl Planta {
             }
             let Some((predicate, arguments)) = element.fact() else { return true };
             let [subject, value] = &arguments[..] else { return true };
-            let base_fact = facts.iter().find(|(own, stated)| *own == predicate && stated[0] == *subject);
-            match base_fact {
-                Some((_, stated)) if stated[1] != *value => {
+            let base_values = || {
+                let base_facts = facts.iter().filter(|(own, stated)| *own == predicate && stated[0] == *subject);
+                base_facts.map(|(_, stated)| &stated[1])
+            };
+            match base_values().next() {
+                Some(base_value) if base_values().all(|base_value| base_value != value) => {
                     let text = format!(
-                        "the problem's own `({predicate} {subject} {value})` is ignored: the knowledge base says {}",
-                        stated[1]
+                        "the problem's own `({predicate} {subject} {value})` is ignored: the knowledge base says {base_value}"
                     );
                     warnings.push(Message::warning("M202", text));
                     false

@@ -18,8 +18,7 @@ impl<N: Number> Query<'_, N> {
             return Err(property_error("Q403", place, "`multi` is supported with two objectives").into());
         };
         // If one objective has a bound, it is placed second.
-        let (first, second, swapped) =
-            if bound_of(first).is_some() { (second, first, true) } else { (first, second, false) };
+        let (first, second) = if bound_of(first).is_some() { (second, first) } else { (first, second) };
         if bound_of(first).is_some() {
             return Err(property_error("Q403", place, "one objective of `multi` must ask for a value").into());
         }
@@ -48,13 +47,7 @@ impl<N: Number> Query<'_, N> {
         }
         let Ok(vertices) = pareto.vertices(None) else { return Err(Stop::TooMuchWork) };
         let pairs = vertices.iter().map(|vertex| {
-            let pair = [0, 1].map(|number| answer_of(number, &vertex.losses[number], vertex.errors[number]));
-            if swapped {
-                let [a, b] = pair;
-                [b, a]
-            } else {
-                pair
-            }
+            [0, 1].map(|number| answer_of(number, &vertex.losses[number], vertex.errors[number]))
         });
         Ok(Outcome::Front(pairs.collect()))
     }

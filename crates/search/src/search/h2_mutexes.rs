@@ -418,13 +418,13 @@ mod tests {
 
     #[test]
     fn nothing_on_a_path_to_the_goal_is_pruned() {
-        check_all(0..60);
+        check_all(0..30);
     }
 
     #[test]
     #[ignore = "takes minutes"]
     fn nothing_on_a_path_to_the_goal_is_pruned_in_many_tasks() {
-        check_all(60..2_000);
+        check_all(30..2_000);
     }
 
     /// A robot is below three tiles in a column. It paints neighbouring tiles and cannot enter painted tiles.
