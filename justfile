@@ -23,9 +23,9 @@ clippy:
 test:
     cargo test
 
-# The tests that take minutes.
-long:
-    cargo test --release -- --ignored
+# The tests that take minutes or hours (benches/suites.toml); without a name, list the suites.
+long *SUITES:
+    python3 benches/reproduce.py {{SUITES}}
 
 # Fetch the public files that tests read (`just data sources benchmarks`: also those of benchmarks).
 data *LISTS:

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Produces the tables with measured figures of the README and the book from pinned inputs.
+"""Produces the tables with measured figures of the README and the book from pinned inputs, and runs the long test suites.
 
-    reproduce.py              lists all tables with their last run, and checks the figures that the README repeats
-    reproduce.py NAME ...     runs the commands of tables; `readme` names all tables that the README cites
+    reproduce.py              lists all tables and suites with their last run, and checks the figures that the README repeats
+    reproduce.py NAME ...     runs the commands of tables or suites; `readme` names all tables that the README cites
 
 A run records the machine, the load and a digest of all inputs. It writes the output of the last command to
 `benches/results/NAME.txt`, one line to `benches/runs.tsv`, and the list of all tables to `benches/TABLES.md`. It does
@@ -17,6 +17,11 @@ not change the pages. `benches/tables.toml` has the tables:
 - `rows` (optional): pattern of the rows of the page that must occur in the output, because the figures do not depend
   on the machine;
 - `duration` (optional): of a run, if it is long.
+
+`benches/suites.toml` has the suites. They have the same keys, without `page` and `rows`, and also:
+
+- `ignored`: files, or directories, whose ignored tests the suite runs. Every file with an ignored test must belong to a
+  suite or a table, unless its reasons say that the tests are tools, parts of other tests, or need another program.
 
 Needs Python 3.11 and git.
 """
@@ -84,7 +89,7 @@ def pinned():
 def input_digest(table, errors):
     """Returns a digest of all inputs of a table. Appends missing and changed inputs to `errors`."""
     digests, total = pinned(), hashlib.sha256()
-    for name in table["inputs"]:
+    for name in table.get("inputs", []):
         is_data = name.startswith("data:")
         path = data_path(name[5:]) if is_data else ROOT / name
         if not path.exists():
@@ -133,15 +138,16 @@ def reproduce(table, errors):
         return
     scratch = ROOT / "target" / "reproduce"
     scratch.mkdir(parents=True, exist_ok=True)
-    environment = {**os.environ, "METAPLAN_REQUIRE": "data,public-data" if any(name.startswith("data:") for name in table["inputs"]) else ""}
+    environment = {**os.environ, "METAPLAN_REQUIRE": "data,public-data" if any(name.startswith("data:") for name in table.get("inputs", [])) else ""}
     started, load, busy, own = datetime.datetime.now(datetime.UTC), os.getloadavg()[0], busy_seconds(), own_seconds()
-    output = ""
+    output, passed = "", 0
     for command in table["commands"]:
         command = re.sub(r"\{data:([^}]*)\}", lambda match: shlex.quote(str(data_path(match[1]))), command)
         command = command.replace("{python}", shlex.quote(sys.executable)).replace("{scratch}", shlex.quote(str(scratch)))
         print(f"$ {command}", file=sys.stderr, flush=True)
         process = subprocess.run(shlex.split(command), cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
         output = process.stdout
+        passed += sum(int(count) for count in re.findall(r"^test result: .*? (\d+) passed", output, re.MULTILINE))
         if process.returncode != 0:
             print(output, file=sys.stderr)
             errors.append(f"{table['name']}: exit status {process.returncode}: {command}")
@@ -156,15 +162,21 @@ def reproduce(table, errors):
     changed = "+changes" if git("status", "--porcelain", "--untracked-files=no", *table["measures"]) else ""
     run = dict(zip(COLUMNS, [
         table["name"], f"{started:%Y-%m-%d %H:%M}", git("rev-parse", "--short=10", "HEAD") + changed, inputs, machine(),
-        f"{load:.1f}", f"{os.getloadavg()[0]:.1f}", other, f"{seconds:.0f}", "ok" if len(errors) == before else "failed",
+        f"{load:.1f}", f"{os.getloadavg()[0]:.1f}", other, f"{seconds:.0f}", result(table, passed, len(errors) > before),
     ]))
     record(run, figures)
+
+
+def result(table, passed, has_failed):
+    if has_failed:
+        return "failed"
+    return "ok" if "page" in table else f"ok: {passed} tests passed"
 
 
 def record(run, figures):
     (BENCHES / "results").mkdir(exist_ok=True)
     head = [f"{key}: {run[key]}" for key in COLUMNS]
-    if run["result"] == "ok":
+    if run["result"].startswith("ok"):
         (BENCHES / "results" / f"{run['table']}.txt").write_text("\n".join([*head, "", *figures]) + "\n")
     print("\n".join([*head, "", *figures]))
     path = BENCHES / "runs.tsv"
@@ -174,6 +186,26 @@ def record(run, figures):
         if is_new:
             writer.writeheader()
         writer.writerow(run)
+
+
+def last_run(table, last):
+    """Returns the cells of the last run of a table."""
+    run = last.get(table["name"])
+    if not run:
+        return ["never recorded", "", "", "", "", ""]
+    return [run["date"], run["commit"], run["result"], f"{run['load_before']}, {run['load_after']}", run["other_cores"], run["machine"]]
+
+
+def unlisted(tables):
+    """Returns errors for files with ignored tests that no suite and no table runs."""
+    paths = [path for table in tables for path in table.get("ignored", [])]
+    errors = [f"suites.toml: {path} does not exist" for path in paths if not (ROOT / path).exists()]
+    for file in git("ls-files", "*.rs").splitlines():
+        reasons = re.findall(r'#\[ignore = "([^"]*)"\]', (ROOT / file).read_text())
+        is_listed = any(file == path or file.startswith(f"{path}/") for path in paths)
+        if not is_listed and not all(re.search(r"^a tool|part of|needs ", reason) for reason in reasons):
+            errors.append(f"{file}: no suite of benches/suites.toml runs its ignored tests: {'; '.join(reasons)}")
+    return errors
 
 
 def markdown(tables):
@@ -186,12 +218,15 @@ def markdown(tables):
         "| table | page | inputs | last run (UTC) | commit | result | load | other | machine |", "|---|---|---|---|---|---|---|---|---|",
     ]
     for table in tables:
-        run = last.get(table["name"])
-        inputs = ", ".join(f"`{name}`" for name in table["inputs"])
-        cells = ["never recorded", "", "", "", "", ""]
-        if run:
-            cells = [run["date"], run["commit"], run["result"], f"{run['load_before']}, {run['load_after']}", run["other_cores"], run["machine"]]
-        lines.append("| " + " | ".join([table["name"], f"[{table['page']}](../{table['page']})", inputs, *cells]) + " |")
+        if "page" in table:
+            inputs = ", ".join(f"`{name}`" for name in table["inputs"])
+            lines.append("| " + " | ".join([table["name"], f"[{table['page']}](../{table['page']})", inputs, *last_run(table, last)]) + " |")
+    suites = [table for table in tables if "page" not in table]
+    if suites:
+        lines += ["", "## Long test suites", "", "`just long NAME` runs a suite. Its tests are ignored by `cargo test`.", ""]
+        lines += ["| suite | ignored tests in | last run (UTC) | commit | result | load | other | machine |", "|---|---|---|---|---|---|---|---|"]
+    for suite in suites:
+        lines.append("| " + " | ".join([suite["name"], ", ".join(f"`{path}`" for path in suite["ignored"]), *last_run(suite, last)]) + " |")
     for table in tables:
         lines += ["", f"## {table['name']}", "", *([f"A run takes {table['duration']}.", ""] if "duration" in table else []), "```text"]
         lines += [*(re.sub(r"\s+", " ", command) for command in table["commands"]), "```"]
@@ -200,7 +235,7 @@ def markdown(tables):
 
 def wrong_figures(figures, tables):
     """Returns errors for figures of the README that differ from the page of their table."""
-    pages = {table["name"]: table["page"].split("#")[0] for table in tables}
+    pages = {table["name"]: table["page"].split("#")[0] for table in tables if "page" in table}
     readme = (ROOT / "README.md").read_text()
     errors = []
     for figure in figures:
@@ -225,7 +260,7 @@ def print_list(tables):
             known = subprocess.run(["git", "-C", str(ROOT), "cat-file", "-e", commit], capture_output=True).returncode == 0
             later = git("rev-list", "--count", f"{commit}..HEAD", "--", *table["measures"]) if known else "unknown"
             state = f"{run['date']}, {run['result']}, load {run['load_before']}; later commits to what it measures: {later}"
-        print(f"{table['name']:20} {table['page']}\n{'':20} {state}")
+        print(f"{table['name']:20} {table.get('page', 'long test suite')}\n{'':20} {state}")
 
 
 def main():
@@ -234,10 +269,12 @@ def main():
     parser.add_argument("--check", action="store_true", help="only check the figures of the README and the list of tables")
     arguments = parser.parse_args()
     content = tomllib.loads((BENCHES / "tables.toml").read_text())
+    suites = BENCHES / "suites.toml"
     tables, figures = content["table"], content["figure"]
+    tables += tomllib.loads(suites.read_text())["suite"] if suites.exists() else []
     by_name = {table["name"]: table for table in tables}
     names = [name for argument in arguments.tables for name in ([figure["table"] for figure in figures] if argument == "readme" else [argument])]
-    errors = [f"{name}: no such table; the tables are readme, {', '.join(by_name)}" for name in names if name not in by_name]
+    errors = [f"{name}: no such table or suite; there are readme, {', '.join(by_name)}" for name in names if name not in by_name]
     if not errors and names:
         for name in dict.fromkeys(names):
             reproduce(by_name[name], errors)
@@ -247,8 +284,9 @@ def main():
         page = BENCHES / "TABLES.md"
         if not page.exists() or page.read_text() != markdown(tables):
             errors.append("benches/TABLES.md is not the list of benches/tables.toml and runs.tsv; `just reproduce public-tasks` writes it in a second")
-        errors += [f"{table['name']}: {table['page'].split('#')[0]} does not exist" for table in tables if not (ROOT / table["page"].split("#")[0]).exists()]
+        errors += [f"{table['name']}: {table['page'].split('#')[0]} does not exist" for table in tables if "page" in table and not (ROOT / table["page"].split("#")[0]).exists()]
         errors += [f"{table['name']}: {path} does not exist" for table in tables for path in table["measures"] if not (ROOT / path).exists()]
+        errors += unlisted(tables)
         if not arguments.check:
             print_list(tables)
     for error in errors:

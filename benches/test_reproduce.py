@@ -138,8 +138,21 @@ class Reproduce(unittest.TestCase):
         self.write("benches/tables.toml", TABLES.replace('["input", ', "["))
         self.assert_fails("TABLES.md is not the list", "--check")
 
+    def test_suites_count_passed_tests_and_list_all_ignored_ones(self):
+        self.write("src/tests/a.rs", '#[test]\n#[ignore = "takes minutes"]\nfn a() {}\n')
+        self.write("src/tests/b.rs", '#[test]\n#[ignore = "a tool"]\nfn b() {}\n')
+        self.commit()
+        self.assert_fails("src/tests/a.rs: no suite of benches/suites.toml runs its ignored tests: takes minutes", "--check")
+        self.write("summary", "test result: ok. 3 passed; 0 failed\ntest result: ok. 4 passed; 0 failed\n")
+        self.write("benches/suites.toml", '[[suite]]\nname = "long"\ncommands = ["cat summary"]\nignored = ["src/tests"]\nmeasures = ["src"]\n')
+        self.assertEqual(self.run_script("long")[0], 0)
+        self.assertIn("\tok: 7 tests passed\n", (self.root / "benches/runs.tsv").read_text())
+        self.assertIn("| long | `src/tests` | 20", (self.root / "benches/TABLES.md").read_text())
+        self.assertEqual(self.run_script("--check"), (0, "", ""))
+        self.assertIn("long test suite", self.run_script()[1])
+
     def test_unknown_tables_are_errors(self):
-        self.assert_fails("no such table; the tables are readme, measured, computed", "absent")
+        self.assert_fails("no such table or suite; there are readme, measured, computed", "absent")
 
 
 if __name__ == "__main__":
