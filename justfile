@@ -19,7 +19,7 @@ fmt-check:
 clippy:
     cargo clippy --workspace --all-targets -- -D warnings
 
-# All tests of all packages.
+# The tests of the default members.
 test:
     cargo test
 

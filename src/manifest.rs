@@ -1,6 +1,7 @@
 //! Parses manifests (TOML files of missions, settings and studies) into the sections that the caller defines,
 //! and determines the positions of entries for messages.
 
+use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -63,9 +64,13 @@ pub struct ManifestPath {
 /// relative to the current directory.
 ///
 /// # Errors
-/// The file cannot be read or is not a manifest; otherwise the faults of its sections and keys.
+/// The file cannot be read or is not a manifest; otherwise the faults of its sections and keys. If the file does not
+/// exist, the message proposes a similar name.
 pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Errors> {
-    let source = source(file)?;
+    let source = source(file).map_err(|error| {
+        let text = error.message.clone() + &file_suggestion(file);
+        Message::at(&error.code, &file.display().to_string(), None, text)
+    })?;
     parse(source.name(), source.text(), &file.parent().map(Path::to_owned).unwrap_or_default())
 }
 
@@ -179,6 +184,24 @@ impl ManifestPath {
 /// JSON Schema for the values of [`ManifestPath::number`]. It does not restrict the content of strings.
 pub fn decimal(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["number", "string"], "minimum": 0 })
+}
+
+/// Returns `; did you mean …?` for a file that does not exist: with the same name and the extension `.toml`, or the most
+/// similar name of a file `*.toml` in the directory. Returns an empty text if there is no such file.
+fn file_suggestion(file: &Path) -> String {
+    let completed = file.with_extension("toml");
+    let written = if completed.is_file() { &completed } else { file };
+    let Some(name) = written.file_name().and_then(OsStr::to_str).filter(|_| !file.exists()) else {
+        return String::new();
+    };
+    let directory = file.parent().filter(|directory| *directory != Path::new(""));
+    let entries = std::fs::read_dir(directory.unwrap_or(Path::new("."))).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> =
+        names.filter(|name| Path::new(name).extension() == Some(OsStr::new("toml"))).collect();
+    // The order of directory entries depends on the file system.
+    names.sort_unstable();
+    did_you_mean(name, names.iter().map(String::as_str))
 }
 
 /// Removes each component `..` together with the directory before it from a path.

@@ -256,3 +256,23 @@ fn unreadable_files_are_errors_and_unknown_scenarios_are_usage_errors() {
     assert!(outcome.stdout.contains("M101"), "{outcome:#?}");
     assert_eq!(metaplan(&["lint", "missions/ugv.toml", "--scenario", "none"]).status, 2);
 }
+
+#[test]
+fn a_similar_manifest_is_suggested() {
+    for (written, expected) in [
+        ("missions/ugv", "(os error 2); did you mean `ugv.toml`?"),
+        ("missions/ugv.tml", "(os error 2); did you mean `ugv.toml`?"),
+        ("missions/ugw.toml", "(os error 2); did you mean `ugv.toml`?"),
+        ("missions/uvu_plain.toml", "(os error 2); did you mean `uuv_plain.toml`?"),
+        ("missions/nothing_like_it.toml", "(os error 2)"),
+        ("missions", "is a directory"),
+    ] {
+        let outcome = metaplan(&["lint", written, "--format", "json"]);
+        assert_eq!(outcome.status, 3, "{outcome:#?}");
+        let answer = outcome.json();
+        let message = &answer["messages"][0];
+        assert_eq!(message["code"], "M101", "{outcome:#?}");
+        let text = message["message"].as_str().expect("a message");
+        assert!(text.ends_with(expected), "{written}: {text}");
+    }
+}
