@@ -7,13 +7,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use pddl::ast::Name;
 use schemars::{JsonSchema, Schema, schema_for};
 use serde::Deserialize;
 
 use crate::comparison::Roles;
 use crate::file::source;
 use crate::knowledge::Knowledge;
-use crate::manifest::{self, Key, ManifestPath};
+use crate::manifest::{self, Key, ManifestPath, Part};
 use crate::mapek::{AdaptationSection, Settings};
 use crate::message::{Errors, Message, did_you_mean};
 use crate::mission::{
@@ -216,9 +217,34 @@ impl Setup {
     /// Reads the coordinates of places for pictures, from the section `report` of the manifest.
     ///
     /// # Errors
-    /// The file of positions cannot be read or is faulty.
+    /// The file of positions cannot be read or is faulty, or the domain does not have the functions of positions.
     pub fn positions(&self) -> Result<Positions, Errors> {
-        self.report.positions(&self.origin)
+        let positions = self.report.positions(&self.origin)?;
+        if let Positions::Functions(functions) = &positions {
+            Errors::unless_empty(self.origin.quote(self.unknown_functions(functions)))?;
+        }
+        Ok(positions)
+    }
+
+    /// Returns an error M141 for each name in `report.positions` that is no numeric function with one parameter.
+    fn unknown_functions(&self, functions: &[String; 2]) -> Vec<Message> {
+        let of_places =
+            self.mission.domain().functions.iter().filter(|function| function.parameters.len() == 1);
+        let known: Vec<&Name> = of_places.map(|function| &function.identifier.name).collect();
+        let mut wrong = Vec::new();
+        for (index, function) in functions.iter().enumerate() {
+            let name = Name::new(function);
+            if !known.contains(&&name) {
+                let path: [Key; 3] = ["report".into(), "positions".into(), index.into()];
+                let place = self.origin.place_of(&path, Part::Value);
+                let suggestion = did_you_mean(function, known.iter().map(|other| other.as_str()));
+                let text = format!(
+                    "the domain has no function `{function}` with one parameter (a place){suggestion}"
+                );
+                wrong.push(Message::at("M141", self.file(), place, text));
+            }
+        }
+        wrong
     }
 
     fn in_scenario(&self, name: &str, Mistake { path, part, message }: Mistake) -> Message {

@@ -38,7 +38,8 @@ pub struct PlanAnswer {
     /// Number of steps up to which all plans were considered; for a proof by search, the number of
     /// steps of the plan, or 0.
     horizon: usize,
-    /// Proof of the status; null if it is not proved.
+    /// Proof that the plan is optimal, or that no plan exists; otherwise null. The status
+    /// `unsolvable_within_horizon` can have none: the formulas up to `horizon` have no plan.
     proof: Option<ProofPart>,
     /// `proved` or `suspected` for a metric without a best value, else null.
     unbounded: Option<&'static str>,

@@ -173,6 +173,10 @@ impl Arguments {
                 "`--plan-format btcpp` writes a sequence of actions, and with `--concurrent` they overlap";
             return Err(usage("M107", text.to_owned()));
         }
+        if self.confirm && self.engine == EngineName::Search {
+            let text = "`--confirm` uses the SAT solver, and `--engine search` excludes it";
+            return Err(usage("M107", text.to_owned()));
+        }
         if self.minimize.len() > 1 && self.overlap.separation().is_some() {
             let text = "`--concurrent` takes one objective; add several with weights";
             return Err(usage("M107", text.to_owned()));

@@ -184,9 +184,9 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "M141",
-        "A file of positions has a wrong line.",
-        "Lines have the form `place,x,y`, one per place. The first line can be a heading without numbers.",
-        "Correct the line.",
+        "Positions of places are wrong.",
+        "Lines of a file have the form `place,x,y`, one per place. The first line can be a heading without numbers. Two names are functions of the domain with one parameter.",
+        "Correct the line or the name.",
     ],
     [
         "M142",

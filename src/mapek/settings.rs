@@ -19,7 +19,7 @@ use crate::number;
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptationSection {
-    /// Minimum improvement of the metric for which a valid plan is replaced; 0 means any improvement.
+    /// Minimum improvement of the metric for which a valid plan is replaced (default 0: any improvement).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     minimum_benefit: Option<Spanned<toml::Value>>,
@@ -57,8 +57,8 @@ pub struct AdaptationSection {
     #[serde(default)]
     measured: MeasuredsSection,
     /// Immediate reaction, before planning, if the current action loses a design or cannot continue.
-    /// `reconfigure` selects other available designs if the action can be completed with them, and
-    /// suspends it otherwise. `suspend` always suspends it.
+    /// `reconfigure` (default) selects other available designs if the action can be completed with
+    /// them, and suspends it otherwise. `suspend` always suspends it.
     #[serde(default)]
     safe_reaction: SafeReaction,
     /// Seconds without acknowledgement after which an effect is overdue, and minimum time without a
@@ -70,8 +70,8 @@ pub struct AdaptationSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     deadline_factor: Option<Spanned<toml::Value>>,
-    /// Reaction if the journal cannot be written, as on a full disk: `stop` ends the program; `continue`
-    /// marks the journal as incomplete, so that it cannot be resumed, answers `unrecorded`, and continues
+    /// Reaction if the journal cannot be written, as on a full disk: `stop` (default) ends the program;
+    /// `continue` marks the journal as incomplete, so that it cannot be resumed, answers `unrecorded`, and continues
     /// without it.
     #[serde(default)]
     unrecorded: Unrecorded,

@@ -58,9 +58,12 @@ pub(super) fn event() -> Value {
     })
 }
 
-/// Returns the JSON Schema of the loop's answers.
+/// Returns the JSON Schema of the loop's answers, with or without a plan.
 pub fn answer_schema() -> Schema {
-    Schema::try_from(answer()).unwrap_or_default()
+    let mut schema = answer();
+    // The answer `ready` of `run --configure` lists the names of the objectives.
+    schema["properties"]["objectives"]["items"]["type"] = json!(["object", "string"]);
+    Schema::try_from(schema).unwrap_or_default()
 }
 
 pub(super) fn answer() -> Value {

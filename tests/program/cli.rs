@@ -359,6 +359,30 @@ fn all_solvers_give_the_same_answer() {
 }
 
 #[test]
+fn open_durations_exclude_timed_initial_literals() {
+    let domain =
+        "(define (domain d) (:requirements :durative-actions :duration-inequalities :timed-initial-literals)
+  (:predicates (ready) (done))
+  (:durative-action work :parameters () :duration (>= ?duration 3)
+    :condition (at start (ready)) :effect (at end (done))))";
+    let problem = |init: &str| format!("(define (problem p) (:domain d) (:init {init}) (:goal (done)))");
+    check(&plan(domain, &problem("(ready)"), &[]), 0, &["cost 3", "optimal, proved"]);
+    let timed = plan(domain, &problem("(at 2 (ready))"), &[]);
+    check(&timed, 3, &["E301", "`(>= ?duration …)` without timed initial literals"]);
+}
+
+#[test]
+fn search_alone_confirms_nothing() {
+    let search = ["plan", "missions/ugv.toml", "--engine", "search"];
+    check(&metaplan(&search), 0, &["optimal, proved"]);
+    check(
+        &metaplan(&[&search[..], &["--confirm"]].concat()),
+        2,
+        &["M107", "`--confirm`", "`--engine search`"],
+    );
+}
+
+#[test]
 #[cfg(unix)]
 fn claims_of_external_solvers_are_not_proofs() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -77,6 +77,30 @@ fn unused_names_are_warnings() {
 }
 
 #[test]
+fn functions_of_positions_exist() {
+    let positions = |names: &str| {
+        let written = format!("positions = {names}");
+        check(
+            &[
+                ("mission.toml", "positions = \"places.csv\"", &written),
+                ("domain.pddl", "(:functions", "(:functions (east ?place - place) (north ?place - place)"),
+            ],
+            3,
+            &["M141"],
+        )
+    };
+    let outcome = positions("[\"esat\", \"North\"]");
+    for word in
+        ["no function `esat` with one parameter", "did you mean `east`?", "mission.toml:16:14", "1 error,"]
+    {
+        assert!(outcome.stdout.contains(word), "no `{word}`: {}", outcome.stdout);
+    }
+    // `battery` has no parameter.
+    let outcome = positions("[\"up\", \"battery\"]");
+    assert!(outcome.stdout.contains("`up`") && outcome.stdout.contains("2 errors,"), "{}", outcome.stdout);
+}
+
+#[test]
 fn missing_and_negative_numbers_are_warnings() {
     let misspelt = (
         "robot.ttl",

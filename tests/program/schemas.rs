@@ -228,7 +228,10 @@ fn answers_of_the_loop_conform() {
     let lines = "{\"event\":\"component_status\",\"component\":\"c_kinect\",\"status\":\"FALSE\"}\n{\"event\":\"zzz\"}\n";
     let outcome = metaplan_in(&root(), &["run", "missions/ugv.toml"], lines);
     assert!(outcome.stdout.lines().count() > 5, "{outcome:#?}");
-    for line in outcome.stdout.lines() {
+    let configure = ["run", "--configure", "ontology/kb/uuv.ttl", "--rules", "coadaptation"];
+    let without_plan = metaplan_in(&root(), &configure, "{\"event\":\"tick\",\"time\":1}\n");
+    assert!(without_plan.stdout.contains("\"objectives\":[\""), "{without_plan:#?}");
+    for line in outcome.stdout.lines().chain(without_plan.stdout.lines()) {
         let answer: Value = serde_json::from_str(line).expect("JSON");
         assert_eq!(validate("answer", &answer), Ok(()));
     }

@@ -76,8 +76,8 @@ pub struct MeasuredSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     period: Number,
-    /// Value of a silent sensor: `worst` (the value that satisfies the fewest bounds of designs), `keep`
-    /// (the last value), `unknown` (no value, which violates no requirement).
+    /// Value of a silent sensor: `worst` (default: the value that satisfies the fewest bounds of designs),
+    /// `keep` (the last value), `unknown` (no value, which violates no requirement).
     #[serde(default)]
     stale: Stale,
 }

@@ -122,7 +122,8 @@ pub(super) fn duration(
     let Some(chosen) = selected else {
         names.unsupported(
             "a duration without one bound that the metric makes it take",
-            "one `(= ?duration …)`, one `(>= ?duration …)` and a metric that does not reward time, or `--concurrent`",
+            "one `(= ?duration …)`, one `(>= ?duration …)` without timed initial literals and with a metric that does \
+             not reward time, or `--concurrent`",
             File::Domain,
             span,
         );
