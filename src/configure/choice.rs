@@ -134,8 +134,8 @@ pub(super) fn current(objective: &Objective) -> Option<&str> {
     designs.map(|design| design.name.as_str()).next()
 }
 
-/// Chooses designs for the objectives for which `is_in_need` returns `true` and for those whose design is not available;
-/// the other objectives keep their designs. At a limit, returns the best choice found.
+/// Chooses designs for the objectives for which `is_in_need` returns `true` and for those whose design is not
+/// available. The other objectives keep their designs. At a limit, returns the best choice found.
 pub(super) fn choose(
     knowledge: &Knowledge,
     wishes: &Wishes,
