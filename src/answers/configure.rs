@@ -38,7 +38,8 @@ struct ChoicePart<'a> {
     objective: &'a str,
     /// Function of the objective; null if the knowledge base does not define it.
     function: Option<&'a str>,
-    /// Reasons why the objective needs a design: its statuses, `updatable`, `always improve`, or `ungrounded`.
+    /// Reasons why the objective needs a design: its statuses, `updatable`, `always improve`, `ungrounded`, or that its
+    /// design is not available.
     need: &'a [String],
     /// Previous design, or null.
     before: Option<&'a str>,

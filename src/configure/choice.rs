@@ -61,8 +61,9 @@ pub struct Choice {
     pub objective: String,
     /// Function of the objective, by local name, if it has one.
     pub function: Option<String>,
-    /// Reasons why the objective needs a design: its statuses, `updatable`, `always improve`, or `ungrounded`. Empty if
-    /// the only reason is that the last choice or change of its design failed.
+    /// Reasons why the objective needs a design: its statuses, `updatable`, `always improve`, `ungrounded`, or that it
+    /// is served by a design that is not available. Empty if the only reason is that the last choice or change of its
+    /// design failed.
     pub need: Vec<String>,
     /// The design before the choice, by local name.
     pub before: Option<String>,
@@ -118,6 +119,14 @@ impl Group {
     fn current(&self) -> Option<&str> {
         current(&self.objective)
     }
+
+    /// Returns the design in use, by local name, if the knowledge base concludes or states that it is not available.
+    fn unavailable_design(&self) -> Option<&str> {
+        let current = self.current()?;
+        let is_unavailable =
+            |offer: &Offer| offer.design == current && offer.rejections.contains(&Rejection::Unavailable);
+        self.candidates.iter().any(is_unavailable).then_some(current)
+    }
 }
 
 pub(super) fn current(objective: &Objective) -> Option<&str> {
@@ -125,8 +134,8 @@ pub(super) fn current(objective: &Objective) -> Option<&str> {
     designs.map(|design| design.name.as_str()).next()
 }
 
-/// Chooses designs for the objectives for which `is_in_need` returns `true`; the other objectives keep their designs.
-/// At a limit, returns the best choice found.
+/// Chooses designs for the objectives for which `is_in_need` returns `true` and for those whose design is not
+/// available. The other objectives keep their designs. At a limit, returns the best choice found.
 pub(super) fn choose(
     knowledge: &Knowledge,
     wishes: &Wishes,
@@ -138,7 +147,9 @@ pub(super) fn choose(
     for objective in knowledge.runtime().objectives() {
         let wants = is_in_need(&objective);
         let mut group = offers.group(objective)?;
-        if wants {
+        // The shipped rules infer an error of the objective only from components and requirements. Other rules and
+        // reports about the design make the design unavailable without an error.
+        if wants || group.unavailable_design().is_some() {
             needing.push(group);
         } else {
             let current = group.current().map(ToOwned::to_owned);
@@ -270,7 +281,7 @@ impl Whole<'_> {
         Choice {
             objective: group.objective.individual.name.clone(),
             function: group.objective.function.as_ref().map(|function| function.name.clone()),
-            need: need(&group.objective),
+            need: need(group),
             before: group.current().map(ToOwned::to_owned),
             design: self.designs[at].map(|position| group.candidates[position].design.clone()),
             considered: considered.collect(),
@@ -349,7 +360,8 @@ fn requirement_text(missed: &Missed) -> String {
     format!("{attribute}: estimated {}, required {}: {status}", decimal(estimation), decimal(bound))
 }
 
-fn need(objective: &Objective) -> Vec<String> {
+fn need(group: &Group) -> Vec<String> {
+    let objective = &group.objective;
     let mut need = objective.statuses.clone();
     if objective.updatable {
         need.push("updatable".to_owned());
@@ -359,6 +371,11 @@ fn need(objective: &Objective) -> Vec<String> {
     }
     if need.is_empty() && objective.groundings.is_empty() {
         need.push("ungrounded".to_owned());
+    }
+    if !objective.wants_design()
+        && let Some(design) = group.unavailable_design()
+    {
+        need.push(format!("served by {design}, which is not available"));
     }
     need
 }

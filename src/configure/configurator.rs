@@ -144,8 +144,8 @@ impl Configurator {
     }
 
     /// Chooses designs for the objectives in need, without adopting them. An objective is in need if its status or
-    /// properties require a design, or if it has no design. It is also in need if the last choice or change of its
-    /// design failed. At a limit, returns the best choice found.
+    /// properties require a design, if it has no design, or if its design is not available. It is also in need if the
+    /// last choice or change of its design failed. At a limit, returns the best choice found.
     ///
     /// # Errors
     /// The rules do not terminate.

@@ -278,6 +278,57 @@ fn a_failed_design_is_replaced_and_requested_again_once_realisable() {
     assert_eq!(deliver(&mut keeper, r#"{"event":"acknowledged","effect":6}"#), []);
 }
 
+/// A rule of the user and an event can make a design unavailable without an error of its objective.
+#[test]
+fn an_unavailable_design_in_use_is_replaced_without_an_error_of_the_objective() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let (file, dark) = (directory.path().join("robot.ttl"), directory.path().join("dark.swrl"));
+    std::fs::write(&file, format!("{ROBOT}:c_lamp a t:Component .")).expect("written");
+    let rule = "@prefix t: <http://metacontrol.org/tomasys#> .
+        @prefix r: <http://example.org/robot#> .
+        [dark] t:requiresC(?fd, r:c_arm) ^ t:c_status(r:c_lamp, \"FALSE\") -> t:fd_realisability(?fd, false) .";
+    std::fs::write(&dark, rule).expect("written");
+    let rules = vec!["coadaptation".to_owned(), dark.display().to_string()];
+    let sources = Sources { documents: vec![file], rules, ..Sources::default() };
+    let knowledge = Knowledge::read(&sources).expect("readable");
+    let mut keeper = Keeper::new(Configurator::new(knowledge, Wishes::default()).expect("no wishes"), None);
+    keeper.start();
+    deliver(&mut keeper, r#"{"event":"objective_added","objective":"o1","function":"f_look"}"#);
+    let (close, far) = (Some("fd_look_close"), Some("fd_look_far"));
+    let answers =
+        deliver(&mut keeper, r#"{"event":"component_status","component":"c_lamp","status":"FALSE"}"#);
+    assert_eq!(reconfigurations(&answers), [("o1", close, far)]);
+    let reasons = answers.iter().find_map(|answer| match answer {
+        KeeperAnswer::Service(Service::Reconfigure { because, .. }) => Some(because.as_slice()),
+        _ => None,
+    });
+    let expected = [
+        "o1 is served by fd_look_close, which is not available",
+        "fd_look_close: rule: dark",
+        "fd_look_close: requiresC(fd_look_close, c_arm)",
+        "fd_look_close: c_status(c_lamp, \"FALSE\")",
+    ];
+    assert_eq!(reasons.expect("a change"), expected);
+    // No design is available, and the current one stays. The report is not repeated.
+    let far_fails = r#"{"event":"design_status","design":"fd_look_far","realisable":false}"#;
+    let answers = deliver(&mut keeper, far_fails);
+    assert_eq!(reconfigurations(&answers), []);
+    assert!(
+        answers.iter().any(|answer| matches!(answer, KeeperAnswer::Service(Service::Unserved { .. }))),
+        "{answers:?}"
+    );
+    assert_eq!(deliver(&mut keeper, r#"{"event":"tick"}"#), []);
+    let answers =
+        deliver(&mut keeper, r#"{"event":"component_status","component":"c_lamp","status":"RECOVERED"}"#);
+    assert_eq!(reconfigurations(&answers), [("o1", far, close)]);
+    // An available design is kept if another one becomes available.
+    deliver(&mut keeper, &far_fails.replace("false", "true"));
+    let close_fails = far_fails.replace("fd_look_far", "fd_look_close");
+    assert_eq!(reconfigurations(&deliver(&mut keeper, &close_fails)), [("o1", close, far)]);
+    let answers = deliver(&mut keeper, &close_fails.replace("false", "true"));
+    assert_eq!(reconfigurations(&answers), []);
+}
+
 #[test]
 fn a_time_too_far_ahead_is_refused() {
     let mut keeper = Keeper::new(Configurator::new(robot(), Wishes::default()).expect("no wishes"), None);

@@ -61,6 +61,21 @@ fn a_noisy_light_costs_one_reconfiguration() {
     assert_eq!(filtered[0]["because"], "hysteresis");
 }
 
+/// Bounds in rules are in the manifest. Their keys say on which side designs are lost.
+#[test]
+fn a_sample_that_violates_a_bound_of_a_rule_counts_at_once() {
+    let samples = [0.45, 0.505, 0.52, 0.495];
+    for (key, held) in [
+        ("upper_bounds", [false, false, false, true]),
+        ("lower_bounds", [false, true, false, false]),
+        ("bounds", [false, true, false, true]),
+    ] {
+        let mut control = started(&format!("[adaptation.measured.ambient_light]\n{key} = [0.5]\n"));
+        let is_held = |value| words(&feed(&mut control, &light(value), 1.0)).contains(&"filtered".to_owned());
+        assert_eq!(samples.map(is_held), held, "{key}");
+    }
+}
+
 #[test]
 fn failures_and_clear_crossings_count_at_once() {
     for line in [kinect("FALSE"), kinect("ERROR"), light(0.9)] {

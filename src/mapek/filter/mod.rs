@@ -90,14 +90,14 @@ impl Filters {
         let nothing = MeasuredSettings::default();
         let measured = bounds.into_iter().map(|(name, mut bounds)| {
             let entry = settings.measured.get(&name).unwrap_or(&nothing);
-            // A bound in the manifest is only a number. It is unknown whether designs require at least or at most this
-            // value, so both are added.
-            bounds.extend(
-                entry
-                    .bounds
-                    .iter()
-                    .flat_map(|bound| [(bound.clone(), Side::Least), (bound.clone(), Side::Most)]),
-            );
+            for (values, side) in [
+                (&entry.lower_bounds, Side::Least),
+                (&entry.upper_bounds, Side::Most),
+                (&entry.bounds, Side::Least),
+                (&entry.bounds, Side::Most),
+            ] {
+                bounds.extend(values.iter().map(|value| (value.clone(), side)));
+            }
             bounds.sort();
             bounds.dedup();
             let band = |value: &BigRational| {

@@ -44,8 +44,18 @@ pub struct MeasuredSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     hysteresis: Number,
-    /// Additional bounds at which designs change, such as those in rules. The bounds of designs in the
+    /// Additional values that designs need at least, such as those in rules. The bounds of designs in the
     /// knowledge base are included automatically.
+    #[serde(default)]
+    #[schemars(with = "Vec<f64>")]
+    lower_bounds: Vec<Spanned<toml::Value>>,
+    /// Additional values that designs need at most, such as those in rules. The bounds of designs in the
+    /// knowledge base are included automatically.
+    #[serde(default)]
+    #[schemars(with = "Vec<f64>")]
+    upper_bounds: Vec<Spanned<toml::Value>>,
+    /// Additional bounds on both sides of which designs are lost. In both directions, only a sample at the
+    /// distance `hysteresis` counts. For designs that are lost on one side, use `lower_bounds` or `upper_bounds`.
     #[serde(default)]
     #[schemars(with = "Vec<f64>")]
     bounds: Vec<Spanned<toml::Value>>,
@@ -119,13 +129,14 @@ impl MeasuredSection {
             |name: &str, value: &Number| value.as_ref().map(|value| origin.number(name, value)).transpose();
         let signed =
             |name: &str, value: &Number| value.as_ref().map(|value| signed(name, value, origin)).transpose();
+        let list = |name: &str, values: &[Spanned<toml::Value>]| {
+            values.iter().map(|value| self::signed(name, value, origin)).collect::<Result<Vec<_>, _>>()
+        };
         let settings = MeasuredSettings {
             hysteresis: positive("hysteresis", &self.hysteresis)?,
-            bounds: self
-                .bounds
-                .iter()
-                .map(|bound| self::signed("bounds", bound, origin))
-                .collect::<Result<_, _>>()?,
+            lower_bounds: list("lower_bounds", &self.lower_bounds)?,
+            upper_bounds: list("upper_bounds", &self.upper_bounds)?,
+            bounds: list("bounds", &self.bounds)?,
             agree: self.agree,
             of: self.of,
             debounce: seconds("debounce", &self.debounce, origin)?.unwrap_or_default(),

@@ -49,8 +49,13 @@ pub struct MeasuredSettings {
     /// Hysteresis: distance from a violated bound at which the bound counts as satisfied again, in the attribute's
     /// unit. Default: a share of the bound.
     pub hysteresis: Option<BigRational>,
-    /// Additional bounds at which designs change, such as bounds in rules. The bounds of designs in the knowledge base
-    /// are included automatically.
+    /// Additional values that designs need at least, such as bounds in rules. The bounds of designs in the knowledge
+    /// base are included automatically.
+    pub lower_bounds: Vec<BigRational>,
+    /// Additional values that designs need at most.
+    pub upper_bounds: Vec<BigRational>,
+    /// Additional bounds on both sides of which designs are lost. In both directions, only a sample at the distance of
+    /// the hysteresis counts.
     pub bounds: Vec<BigRational>,
     /// Number of the last `of` samples that must have crossed a bound; 0 and 1 disable the condition.
     pub agree: usize,

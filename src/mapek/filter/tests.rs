@@ -9,6 +9,7 @@ use ontology::tomasys::change::Status;
 
 use super::attribute::{AttributeFilter, AttributeState, Bound, Elapsed, Hold, Side, Stale, Verdict};
 use super::component::{ComponentFilter, ComponentState};
+use super::{FilterSettings, Filters, MeasuredSettings};
 
 fn value(thousandths: i64) -> BigRational {
     BigRational::new(thousandths.into(), 1000.into())
@@ -89,6 +90,34 @@ fn noise_within_the_band_crosses_at_most_once() {
                 panic!("{far} is held")
             };
             assert_eq!(value, self::value(far));
+        }
+    }
+}
+
+#[test]
+fn a_bound_in_the_settings_has_the_direction_of_its_key() {
+    let ninety = || vec![value(90_000)];
+    let settings = [
+        MeasuredSettings { upper_bounds: ninety(), ..MeasuredSettings::default() },
+        MeasuredSettings { lower_bounds: ninety(), ..MeasuredSettings::default() },
+        MeasuredSettings { bounds: ninety(), ..MeasuredSettings::default() },
+    ];
+    // The band is 1.8. `None` is a sample that is held back.
+    let samples = [85, 91, 92, 89, 88];
+    let believed = [
+        [Some(85), Some(91), Some(92), None, Some(88)],
+        [Some(85), None, Some(92), Some(89), Some(88)],
+        [Some(85), None, Some(92), None, Some(88)],
+    ];
+    for (measured, believed) in settings.into_iter().zip(believed) {
+        let mut settings = FilterSettings::default();
+        settings.measured.insert("humidity".to_owned(), measured);
+        let filters = Filters::new(&settings, None);
+        let mut states = filters.states(None);
+        for (sample, expected) in samples.into_iter().zip(believed) {
+            let sample = value(1000 * sample);
+            let result = filters.sample(&mut states, Duration::ZERO, "humidity", &sample, &mut Vec::new());
+            assert_eq!(result, expected.map(|number| value(1000 * number)), "{sample}: {settings:?}");
         }
     }
 }
