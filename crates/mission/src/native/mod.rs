@@ -118,8 +118,8 @@ impl CoAdaptation {
         let valued = chosen.chain(changed).filter(|(function, ..)| has_value(problem, function));
         let error = |(function, kind, attribute): (&Name, &str, &String)| {
             let text = format!(
-                "`{function}` is bound to `{kind}:{attribute}`, but the problem gives it a value; remove the binding, or \
-                 the value and all other uses as a variable"
+                "`{function}` is bound to `{kind}:{attribute}`, but the problem gives it a value; remove the binding, \
+                 or the value and all its other uses"
             );
             Message::error("M233", text)
         };
