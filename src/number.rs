@@ -8,6 +8,9 @@ use serde_json::Value;
 /// exponent. Larger numbers would only consume memory.
 const MAX_CHARACTERS: usize = 40;
 
+/// Description of the numbers that [`exact`] accepts, for messages.
+pub(crate) const DECIMAL: &str = "a decimal number (at most 40 characters; exponent from -40 to 40)";
+
 /// Number of decimals to which values are rounded. Floating-point values of a robot would otherwise
 /// make the planner's integers huge.
 const DECIMALS: u32 = 6;
@@ -67,7 +70,7 @@ pub(crate) fn of_plan(value: &planner::Exact) -> BigRational {
 
 #[cfg(test)]
 mod tests {
-    use super::{decimal, exact, rounded};
+    use super::{DECIMAL, MAX_CHARACTERS, decimal, exact, rounded};
 
     fn check(text: &str, expected: Option<&str>) {
         assert_eq!(exact(text).map(|value| decimal(&rounded(&value))).as_deref(), expected, "{text}");
@@ -84,5 +87,11 @@ mod tests {
         check("NaN", None);
         check("", None);
         check(&"9".repeat(60), None);
+        check(&"9".repeat(MAX_CHARACTERS), Some(&"9".repeat(MAX_CHARACTERS)));
+        check("1e41", None);
+        assert!(
+            DECIMAL
+                .contains(&format!("at most {MAX_CHARACTERS} characters; exponent from -{MAX_CHARACTERS}"))
+        );
     }
 }

@@ -24,6 +24,8 @@ pub(super) struct KeeperSession<'a> {
     begun: Duration,
     /// `true` if a line had a time. Time then advances with lines only.
     has_times: bool,
+    /// Number of blank lines so far, which the loop does not receive.
+    blank_lines: u64,
 }
 
 impl<'a> KeeperSession<'a> {
@@ -34,7 +36,7 @@ impl<'a> KeeperSession<'a> {
         outlet: &'a Outlet,
     ) -> Self {
         let (begun, clock) = (keeper.now(), SystemClock::default());
-        Self { common, keeper, journal, outlet, clock, begun, has_times: false }
+        Self { common, keeper, journal, outlet, clock, begun, has_times: false, blank_lines: 0 }
     }
 
     /// Answers all lines of a file. Filters that become due between two lines are handled together with the later
@@ -76,17 +78,23 @@ impl<'a> KeeperSession<'a> {
             Some(journal) => journal.begin(&mut self.keeper).map_err(|error| unwritten(&error))?,
         };
         self.warn(&answers);
-        flow(self.outlet.answer(self.keeper.lines(), &answers, read))
+        flow(self.outlet.answer(self.number(), &answers, read))
+    }
+
+    /// Returns the number of the last line that the loop received. Counts blank lines of this process, too.
+    fn number(&self) -> u64 {
+        self.keeper.lines() + self.blank_lines
     }
 
     fn answer_line(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {
         let observation = Observation::parse(&line.text);
         self.has_times = self.has_times || line.now.is_some() || observation.time.is_some();
         let now = self.begun + line.now.unwrap_or_else(|| self.clock.now());
-        self.outlet.heard(self.keeper.lines() + 1, now, &line.text);
+        self.blank_lines += line.blank_lines;
+        self.outlet.heard(self.number() + 1, now, &line.text);
         let answers = self.handle(&line.text, &observation, now)?;
         self.warn(&answers);
-        flow(self.outlet.answer(self.keeper.lines(), &answers, read))
+        flow(self.outlet.answer(self.number(), &answers, read))
     }
 
     /// Returns the time until a filter is due, for example after a debounce time. Returns `None` if
@@ -105,7 +113,7 @@ impl<'a> KeeperSession<'a> {
         }
         let answers = self.handle(Observation::TIMER, &Observation::timer(), now)?;
         self.warn(&answers);
-        flow(self.outlet.answer_so_far(self.keeper.lines(), &answers))
+        flow(self.outlet.answer_so_far(self.number(), &answers))
     }
 
     fn warn(&self, answers: &[KeeperAnswer]) {

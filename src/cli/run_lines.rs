@@ -12,9 +12,11 @@ use crate::recording::{FIRST_BYTE, Replay};
 use crate::cli::common::Common;
 use crate::cli::output;
 
-/// A line of input, with its time since the start of the mission if the source has times.
+/// A non-blank line of input, with its time since the start of the mission if the source has times.
 pub(super) struct Line {
     pub(super) text: String,
+    /// Number of blank lines between the previous line and this line.
+    pub(super) blank_lines: u64,
     pub(super) now: Option<Duration>,
 }
 
@@ -70,7 +72,7 @@ impl Lines {
             Source::Text(reader) => next_text(reader),
             Source::Recorded(replay) => {
                 let line = replay.next_line()?;
-                Ok(line.map(|line| Line { text: line.text, now: Some(line.now) }))
+                Ok(line.map(|line| Line { text: line.text, blank_lines: 0, now: Some(line.now) }))
             }
         });
         let line = line.map_err(|error| {
@@ -118,14 +120,16 @@ fn stdin_is_file() -> bool {
 }
 
 fn next_text(reader: &mut Reader) -> io::Result<Option<Line>> {
+    let mut blank_lines = 0;
     loop {
         let Some(bytes) = read_line(reader)? else { return Ok(None) };
         let text = String::from_utf8_lossy(&bytes);
         // A byte order mark may precede the first line, and also later lines where files were concatenated.
         let text = text.trim_start_matches('\u{feff}').trim_ascii();
         if !text.is_empty() {
-            return Ok(Some(Line { text: text.to_owned(), now: None }));
+            return Ok(Some(Line { text: text.to_owned(), blank_lines, now: None }));
         }
+        blank_lines += 1;
     }
 }
 

@@ -60,6 +60,8 @@ pub(super) struct Session<'a> {
     search: ParallelSearch,
     /// `true` if a line had a time of its own. Time then advances with lines only.
     has_times: bool,
+    /// Number of blank lines so far, which the loop does not receive.
+    blank_lines: u64,
 }
 
 impl<'a> Session<'a> {
@@ -83,6 +85,7 @@ impl<'a> Session<'a> {
             open: None,
             search: ParallelSearch::default(),
             has_times: false,
+            blank_lines: 0,
         }
     }
 
@@ -106,7 +109,7 @@ impl<'a> Session<'a> {
             None => Vec::new(),
             Some(journal) => journal.begin_reacting(&mut self.control).map_err(|error| unwritten(&error))?,
         };
-        self.open = Some((self.control.beliefs().lines(), read));
+        self.open = Some((self.number(), read));
         let mut flow = self.say(&answers)?;
         let (mut waiting, mut is_ended) = (VecDeque::new(), false);
         while flow == Flow::GoesOn {
@@ -154,7 +157,7 @@ impl<'a> Session<'a> {
             None => self.control.start(),
             Some(journal) => journal.begin(&mut self.control).map_err(|error| unwritten(&error))?,
         };
-        let number = self.control.beliefs().lines();
+        let number = self.number();
         self.answer(number, &answers, read)
     }
 
@@ -166,8 +169,13 @@ impl<'a> Session<'a> {
                 journal.handle(&mut self.control, &line.text, now).map_err(|error| unwritten(&error))?
             }
         };
-        let number = self.control.beliefs().lines();
+        let number = self.number();
         self.answer(number, &answers, read)
+    }
+
+    /// Returns the number of the last line that the loop received. Counts blank lines of this process, too.
+    fn number(&self) -> u64 {
+        self.control.beliefs().lines() + self.blank_lines
     }
 
     /// Forwards a line to the recording and the web page. Returns the time of the line since the start of the mission.
@@ -199,7 +207,7 @@ impl<'a> Session<'a> {
                 journal.observe(&mut self.control, &line.text, now).map_err(|error| unwritten(&error))?
             }
         };
-        self.open = Some((self.control.beliefs().lines(), read));
+        self.open = Some((self.number(), read));
         self.search.update(Some(self.control.question()));
         // A reaction with effects is written at once. A reaction without effects is joined with the deliberation, so
         // that one decision is written instead of two.
@@ -327,7 +335,7 @@ impl<'a> Session<'a> {
 
     fn say(&self, answers: &[Answer]) -> Result<Flow, Failure> {
         warn_if_unrecorded(self.common, answers);
-        let number = self.control.beliefs().lines();
+        let number = self.number();
         let flow = flow(self.outlet.answer_so_far(number, answers))?;
         self.outlet.plan(self.control.beliefs(), answers);
         Ok(flow)

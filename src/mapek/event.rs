@@ -30,14 +30,14 @@ pub const LONGEST_LINE: usize = 1 << 20;
 #[schemars(deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Event {
-    /// A sensor reports the value of a quality attribute, or of a function of the problem without parameters.
+    /// A sensor reports the value of a quality attribute, or of a function of the problem.
     #[serde(rename = "measured")]
     Measured {
         /// Local name or IRI.
         attribute: String,
         /// Value, in the attribute's unit.
         #[serde(serialize_with = "as_number")]
-        #[schemars(with = "f64")]
+        #[schemars(schema_with = "decimal_schema")]
         value: BigRational,
     },
     /// A component reports its status.
@@ -85,7 +85,7 @@ pub enum Event {
         action: u64,
         /// Completed part, from 0 to 1, in hundredths.
         #[serde(serialize_with = "as_number")]
-        #[schemars(with = "f64")]
+        #[schemars(schema_with = "fraction_schema")]
         fraction: BigRational,
     },
     /// The goal has changed.
@@ -173,6 +173,26 @@ fn status_schema(_: &mut SchemaGenerator) -> Schema {
     })
 }
 
+/// JSON Schema of a decimal number, or a string that contains one.
+fn decimal_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "anyOf": [
+            { "type": "number" },
+            { "type": "string", "pattern": "^\\s*[+-]?([0-9]+[.]?[0-9]*|[.][0-9]+)([eE][+-]?[0-9]{1,2})?\\s*$" }
+        ]
+    })
+}
+
+/// JSON Schema of a number from 0 to 1, or a string that contains one.
+fn fraction_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "anyOf": [
+            { "type": "number", "minimum": 0, "maximum": 1 },
+            { "type": "string", "pattern": "^\\s*[+]?(0*[.][0-9]+|0+[.]?|0*1([.]0*)?)\\s*$" }
+        ]
+    })
+}
+
 /// JSON Schema of a field that must be present but may be null.
 fn name_or_null_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "null"] })
@@ -243,7 +263,10 @@ impl Observation {
 
     fn read(&mut self, text: &str) -> Result<Vec<Result<Event, Refusal>>, Refusal> {
         if text.len() > LONGEST_LINE {
-            return Err(Refusal::new("M301", format!("a line of {} bytes is too long", text.len())));
+            let text = format!(
+                "the line is longer than {LONGEST_LINE} bytes, the limit; send several shorter lines"
+            );
+            return Err(Refusal::new("M301", text));
         }
         let value: Value = serde_json::from_str(text)
             .map_err(|error| Refusal::new("M301", format!("this is not JSON: {error}")))?;
@@ -269,7 +292,7 @@ fn event(fields: &mut Map<String, Value>) -> Result<Event, Refusal> {
     let event = match kind.as_str() {
         "measured" => Event::Measured {
             attribute: need(fields, "attribute", "the name of an attribute", text)?,
-            value: need(fields, "value", "a decimal number", number::from_json)?,
+            value: need(fields, "value", number::DECIMAL, number::from_json)?,
         },
         "component_status" => Event::Component {
             component: need(fields, "component", "the name of a component", text)?,
@@ -417,8 +440,10 @@ fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>
 }
 
 fn measured(attribute: &str, value: &str) -> Result<Event, Refusal> {
-    let wrong =
-        || Refusal::new("M304", format!("the value `{value}` of {attribute} is not a decimal number"));
+    let wrong = || {
+        let text = format!("the value of {attribute} is `{value}`, but should be {}", number::DECIMAL);
+        Refusal::new("M304", text)
+    };
     Ok(Event::Measured { attribute: attribute.to_owned(), value: number::exact(value).ok_or_else(wrong)? })
 }
 

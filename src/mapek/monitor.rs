@@ -44,6 +44,8 @@ const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 pub(super) struct Monitor {
     /// IRIs and local names of the quality attributes of the knowledge base.
     pub(super) attributes: BTreeSet<String>,
+    /// Those of `attributes` whose measured value cannot have an effect. Their measurements are refused.
+    pub(super) unused_attributes: BTreeSet<String>,
     checked: HashSet<String>,
     pub(super) filters: Filters,
     pub(super) components: HashMap<String, String>,
@@ -53,9 +55,12 @@ impl Monitor {
     pub(super) fn new(mission: &Mission, settings: &Settings) -> Self {
         let kinds =
             mission.knowledge().map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
-        let attributes = kinds.into_iter().flat_map(|kind| [kind.iri, kind.name]).collect();
         let filters = Filters::new(&settings.filters, mission.knowledge());
-        Self { attributes, checked: HashSet::new(), filters, components: HashMap::new() }
+        let unused_kinds =
+            kinds.iter().filter(|kind| !filters.has(&kind.name) && !mission.uses_measurement(&kind.name));
+        let unused_attributes = unused_kinds.flat_map(|kind| [kind.iri.clone(), kind.name.clone()]).collect();
+        let attributes = kinds.into_iter().flat_map(|kind| [kind.iri, kind.name]).collect();
+        Self { attributes, unused_attributes, checked: HashSet::new(), filters, components: HashMap::new() }
     }
 
     pub(super) fn filters(&self) -> &Filters {
@@ -370,7 +375,12 @@ impl BeliefUpdate<'_> {
             }
             return Ok(());
         }
-        let wrong = || Refusal::new("M302", format!("the value `{value}` of {name} is not a decimal number"));
+        let wrong = || {
+            Refusal::new(
+                "M302",
+                format!("the value of {name} is `{value}`, but should be {}", number::DECIMAL),
+            )
+        };
         let value = number::rounded(&number::exact(value).ok_or_else(wrong)?);
         if self.beliefs.mission.value(&name).as_ref() != Some(&value) {
             self.set(&name, &number::decimal(&value))?;

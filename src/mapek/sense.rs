@@ -8,6 +8,7 @@ use crate::mapek::fields::Refusal;
 use crate::mapek::filter::Accepted;
 use crate::mapek::monitor::BeliefUpdate;
 use crate::message::did_you_mean;
+use crate::mission::unused_measurement;
 
 impl BeliefUpdate<'_> {
     /// Applies a report that a function has a design, or has none (`None`), without a request of the loop. The report
@@ -77,6 +78,9 @@ impl BeliefUpdate<'_> {
             (&mut self.beliefs.filters, self.beliefs.now, &mut self.changes.filtered);
         if !is_known {
             return self.measured(attribute, value);
+        }
+        if self.monitor.unused_attributes.contains(attribute) {
+            return Err(Refusal::new("M306", unused_measurement(attribute)));
         }
         match self.monitor.filters.sample(states, now, attribute, value, filtered) {
             Some(value) => self.measured(attribute, &value),

@@ -74,6 +74,11 @@ fn unused_names_are_warnings() {
         1,
         &["M227", "`grasp_time` is bound to `chosen:grasp_tme`", "did you mean `grasp_time`?"],
     );
+    check(
+        &[("mission.toml", "[report]", "[bindings]\nbattery = \"chosen:grasp_time\"\n\n[report]")],
+        3,
+        &["M233", "`battery` is bound to `chosen:grasp_time`, but the problem gives it a value"],
+    );
 }
 
 #[test]

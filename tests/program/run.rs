@@ -48,19 +48,22 @@ fn invalid_lines_are_reported_and_skipped() {
             "1 error",
             "1 handled",
             "2 handled",
-            "3 error",
-            "3 handled",
             "4 error",
             "4 handled",
-            "5 request_action",
+            "5 error",
             "5 handled",
-            "6 duplicate",
+            "6 request_action",
             "6 handled",
-            "7 inferred",
-            "7 plan_kept",
+            "7 duplicate",
             "7 handled",
+            "8 inferred",
+            "8 plan_kept",
+            "8 handled",
         ],
     );
+    let overlong_answer = answers.iter().find(|answer| answer["line"] == 4).expect("an answer");
+    let message = overlong_answer["message"].as_str().expect("a message");
+    assert!(message.contains("longer than 1048576 bytes"), "{message}");
     let last_answer = answers.last().expect("an answer");
     assert!(last_answer["microseconds"].as_u64().is_some(), "{last_answer}");
 }
@@ -117,4 +120,64 @@ fn events_can_come_from_files_and_missions_from_pddl() {
             "1 handled",
         ],
     );
+}
+
+/// Runs the loop on one input line. Returns the code and the message of the error, or `None` if the line is accepted.
+fn refusal(arguments: &[&str], line: &str) -> Option<(String, String)> {
+    let command: Vec<&str> = ["run"].iter().chain(arguments).copied().collect();
+    let outcome = metaplan_in(&root(), &command, line);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let mut answers =
+        outcome.stdout.lines().map(|line| serde_json::from_str::<Value>(line).expect("an answer is JSON"));
+    let error = answers.find(|answer| answer["answer"] == "error")?;
+    let text = |field: &str| error[field].as_str().expect("text").to_owned();
+    Some((text("code"), text("message")))
+}
+
+#[test]
+fn refusals_state_the_cause_and_a_remedy() {
+    let fact = |name: &str, value: &str| {
+        serde_json::json!({ "event": "fact_changed", "name": name, "value": value }).to_string()
+    };
+    let long_number = "9".repeat(300);
+    for (mission, line, code, words) in [
+        ("ugv", fact("ambient_light", "0.5"), "M306", &["is an attribute", "the event `measured`"][..]),
+        ("ugv", fact("safety", "0.5"), "M306", &["nothing measures it"]),
+        ("ugv", fact("travel_time", "5"), "M306", &["number of its arguments: 2", "has 0"]),
+        ("ugv", fact("fd_available fd_aruco", "false"), "M306", &["`component_status`", "`design_status`"]),
+        ("ugv", fact("battery", &long_number), "M302", &["at most 40 characters"]),
+        ("uuv", fact("pipeline_found pl1", "maybe"), "M306", &["`maybe`", "should be `true` or `false`"]),
+    ] {
+        let (actual_code, message) =
+            refusal(&[&format!("missions/{mission}.toml")], &line).expect("a refusal");
+        assert_eq!(actual_code, code, "{line}: {message}");
+        assert!(words.iter().all(|word| message.contains(word)), "{line}: {message}");
+        assert!(!message.contains("did you mean"), "{line}: {message}");
+    }
+}
+
+#[test]
+fn measurements_without_effect_are_refused() {
+    let measured = r#"{"event":"measured","attribute":"safety","value":0.05}"#;
+    let (code, message) = refusal(&["missions/ugv.toml"], measured).expect("a refusal");
+    assert!(code == "M306" && message.contains("nothing measures it"), "{code}: {message}");
+    // A rule that can read the attribute makes the measurement effective, also if it names no attribute.
+    let directory = tempfile::tempdir().expect("a directory");
+    let rules = directory.path().join("own.swrl");
+    let pddl = ["encodings/ugv/domain.pddl", "encodings/ugv/problem.pddl", "--kb", "ontology/kb/ugv.ttl"];
+    for (attribute, is_accepted) in [("ugv:safety", true), ("?type", true), ("ugv:battery_usage", false)] {
+        let text = format!(
+            "@prefix t: <http://metacontrol.org/tomasys#> .\n\
+             @prefix ugv: <http://metacontrol.org/metaplan/ugv#> .\n\
+             [own] t:isQAtype(?qa, {attribute}) ^ t:isMeasured(?qa, true) ^ t:hasValue(?qa, ?value) \
+             ^ swrlb:lessThan(?value, 0.1) -> t:fd_realisability(ugv:fd_aruco, false) .\n"
+        );
+        std::fs::write(&rules, text).expect("written");
+        let rules = rules.display().to_string();
+        let arguments = [&pddl[..], &["--rules", "coadaptation", "--rules", rules.as_str()]].concat();
+        assert_eq!(refusal(&arguments, measured).is_none(), is_accepted, "{attribute}");
+    }
+    // A bound of a design does, too.
+    let bright = r#"{"event":"measured","attribute":"ambient_light","value":0.9}"#;
+    assert_eq!(refusal(&["missions/ugv.toml"], bright), None);
 }

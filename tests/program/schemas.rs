@@ -176,6 +176,7 @@ fn manifests_conform_and_unknown_keys_are_refused() {
 fn event_schema_agrees_with_the_parser() {
     let events = [
         json!({"event": "measured", "attribute": "a", "value": 0.5, "seq": 1, "time": 0.25}),
+        json!({"event": "measured", "attribute": "a", "value": "0.5"}),
         json!({"event": "component_status", "component": "c", "status": "FALSE"}),
         json!({"event": "component_status", "component": "c", "status": true}),
         json!({"event": "action_started", "action": 1}),
@@ -221,13 +222,33 @@ fn event_schema_agrees_with_the_parser() {
         assert!(!is_accepted(&extended), "{extended}");
     }
     assert!(!is_accepted(&json!({"event": "measrued"})));
+    assert!(!is_accepted(&json!({"event": "measured", "attribute": "a", "value": "much"})));
+    for (fraction, is_valid) in [
+        (json!(0), true),
+        (json!(1), true),
+        (json!("0.25"), true),
+        (json!("1.0"), true),
+        (json!(1.5), false),
+        (json!(-0.5), false),
+        (json!("1.5"), false),
+        (json!("2"), false),
+    ] {
+        let event = json!({"event": "action_progress", "action": 1, "fraction": fraction});
+        assert_eq!(is_accepted(&event), is_valid, "{event}");
+    }
 }
 
 #[test]
 fn answers_of_the_loop_conform() {
-    let lines = "{\"event\":\"component_status\",\"component\":\"c_kinect\",\"status\":\"FALSE\"}\n{\"event\":\"zzz\"}\n";
+    // The action becomes overdue, which is no effect.
+    let lines = r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}
+{"event":"zzz"}
+{"event":"action_started","action":1,"time":0}
+{"event":"tick","time":1000}
+"#;
     let outcome = metaplan_in(&root(), &["run", "missions/ugv.toml"], lines);
     assert!(outcome.stdout.lines().count() > 5, "{outcome:#?}");
+    assert!(outcome.stdout.contains("\"effect\":null"), "{outcome:#?}");
     let configure = ["run", "--configure", "ontology/kb/uuv.ttl", "--rules", "coadaptation"];
     let without_plan = metaplan_in(&root(), &configure, "{\"event\":\"tick\",\"time\":1}\n");
     assert!(without_plan.stdout.contains("\"objectives\":[\""), "{without_plan:#?}");

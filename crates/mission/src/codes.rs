@@ -200,4 +200,10 @@ pub const CODES: &[[&str; 4]] = &[
         "An estimation, measurement or requirement uses an attribute that has no other statement. Usually its name is misspelt.",
         "Correct the name, or state `a t:QualityAttributeType`.",
     ],
+    [
+        "M233",
+        "A function has a value, but a sum over designs replaces it.",
+        "`[bindings]` binds it to `chosen:ATTRIBUTE` or `reconfigured:ATTRIBUTE`, and the problem gives it a value.",
+        "Remove the binding if the function is a variable of the problem, and otherwise the value.",
+    ],
 ];

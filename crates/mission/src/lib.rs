@@ -30,4 +30,5 @@ pub use doubts::doubt_about;
 pub use joined::Mission;
 pub use message::{Errors, Message};
 pub use native::CoAdaptation;
+pub use set::unused_measurement;
 pub use {num_rational::BigRational, ontology, pddl, rules};

@@ -67,6 +67,13 @@ impl Mission {
         functions.map(|declared| declared.identifier.name.to_string()).collect()
     }
 
+    /// Returns `true` if a measured value of the attribute, given by local name, can have an effect: on the knowledge
+    /// base, or as the value of a function.
+    pub fn uses_measurement(&self, attribute: &str) -> bool {
+        self.knowledge.as_ref().is_some_and(|knowledge| knowledge.uses_measurement(attribute))
+            || !self.fed_by(attribute).is_empty()
+    }
+
     /// Returns `true` if the domain has a numeric function, given as `name arguments`, with this
     /// number of arguments.
     pub fn is_function(&self, name: &str) -> bool {

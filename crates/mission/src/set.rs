@@ -2,11 +2,10 @@
 //! facts of the problem.
 
 use num_rational::BigRational;
-use pddl::ast::{Atom, InitialElement, Name, Span, Term};
+use pddl::ast::{Atom, Declaration, InitialElement, Name, Span, Term};
 
 use crate::binding::identifier;
 use crate::joined::Mission;
-use crate::knowledge::Knowledge;
 use crate::message::{Message, did_you_mean};
 
 impl Mission {
@@ -27,11 +26,8 @@ impl Mission {
         if let Some(knowledge) = &mut self.knowledge
             && knowledge.has_attribute(name.trim())
         {
-            if !is_measured(knowledge, name.trim()) {
-                let text = format!(
-                    "`{name}` is estimated for designs; nothing measures it, and no design has a bound on it"
-                );
-                return Err(Message::error("M106", text));
+            if !knowledge.uses_measurement(name.trim()) {
+                return Err(Message::error("M106", unused_measurement(name.trim())));
             }
             return knowledge.measure(name.trim(), value).map(|_| ());
         }
@@ -53,11 +49,13 @@ impl Mission {
         let symbol = Name::new(symbol);
         let is_own = matches!(arguments, [design] if self.decides_on(design));
         if self.knowledge.is_some() && self.bindings.is_availability(&symbol) && !is_own {
-            let text =
-                format!("the knowledge base determines `{symbol}`; use `--fail` for failed components");
+            let text = format!(
+                "the knowledge base determines `{symbol}`; use `--fail` for failed components, or the events \
+                 `component_status` and `design_status` of a running loop"
+            );
             return Err(Message::error("M106", text));
         }
-        let arity = |declared: &[pddl::ast::Declaration]| {
+        let arity = |declared: &[Declaration]| {
             declared.iter().find(|d| d.identifier.name == symbol).map(|d| d.parameters.len())
         };
         let arguments: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
@@ -71,7 +69,7 @@ impl Mission {
             (Some(arity), _) if arity == arguments.len() + 1 => {
                 Ok(self.replace_last(&symbol, arguments, Name::new(value)))
             }
-            _ => Err(self.unknown_setting(name)),
+            _ => Err(self.unknown_setting(name, value)),
         }
     }
 
@@ -138,16 +136,61 @@ impl Mission {
         self.problem.init.extend(replacement);
     }
 
-    fn unknown_setting(&self, name: &str) -> Message {
+    /// Returns `true` unless only the explicit form of a plain domain has the symbol. Users cannot set such symbols.
+    fn is_settable(&self, declared: &Declaration) -> bool {
+        self.adaptation.as_ref().is_none_or(|adaptation| !adaptation.is_added(&declared.identifier.name))
+    }
+
+    /// Returns the fault of a setting with a known name: it is an attribute, which [`Mission::set_in_problem`] does not
+    /// set, or its value or the number of its arguments is wrong. Returns `None` if the name is unknown.
+    fn misused_name(&self, name: &str, value: &str) -> Option<String> {
+        let name = name.trim();
+        if let Some(knowledge) = &self.knowledge
+            && knowledge.has_attribute(name)
+        {
+            return Some(if knowledge.uses_measurement(name) {
+                format!(
+                    "`{name}` is an attribute of the knowledge base, and not a value or fact of the problem; report it \
+                     with the event `measured`"
+                )
+            } else {
+                unused_measurement(name)
+            });
+        }
+        let mut words = name.split_whitespace();
+        let symbol = Name::new(words.next()?);
+        let given = words.count();
+        let arity = |declared: &[Declaration]| {
+            let mut declared = declared.iter().filter(|declared| self.is_settable(declared));
+            declared
+                .find(|declared| declared.identifier.name == symbol)
+                .map(|declaration| declaration.parameters.len())
+        };
+        match (arity(&self.domain.functions), arity(&self.domain.predicates)) {
+            (_, Some(arity)) if arity == given => Some(format!(
+                "the value of `{name}` is `{value}`, but should be `true` or `false`, because `{name}` is a predicate \
+                 with all its arguments"
+            )),
+            (Some(arity), _) => Some(format!(
+                "`{symbol}` is a numeric function; number of its arguments: {arity}, but `{name}` has {given}"
+            )),
+            (None, Some(arity)) => Some(format!(
+                "`{symbol}` is a predicate; number of its arguments: {arity}, but `{name}` has {given}; give all of \
+                 them and the value `true` or `false`, or all but the last and the last as the value"
+            )),
+            (None, None) => None,
+        }
+    }
+
+    fn unknown_setting(&self, name: &str, value: &str) -> Message {
+        if let Some(text) = self.misused_name(name, value) {
+            return Message::error("M106", text);
+        }
         let attributes = self.knowledge.iter().flat_map(|knowledge| knowledge.view().attribute_types());
         let attributes: Vec<_> = attributes.map(|attribute| attribute.name).collect();
-        // The user cannot set symbols that only the explicit form of a plain domain has.
-        let adaptation = self.adaptation.as_ref();
-        let is_settable = |d: &&pddl::ast::Declaration| {
-            adaptation.is_none_or(|is_settable| !is_settable.is_added(&d.identifier.name))
-        };
-        let declared = |all: &[pddl::ast::Declaration]| {
-            let each = |d: &pddl::ast::Declaration| d.identifier.name.to_string();
+        let is_settable = |declared: &&Declaration| self.is_settable(declared);
+        let declared = |all: &[Declaration]| {
+            let each = |d: &Declaration| d.identifier.name.to_string();
             all.iter().filter(is_settable).map(each).collect::<Vec<_>>().join(", ")
         };
         let text = format!(
@@ -187,14 +230,10 @@ fn decimal(text: &str) -> Option<BigRational> {
     rules::Literal::parse(text, Some("http://www.w3.org/2001/XMLSchema#decimal"), None).as_rational()
 }
 
-/// Returns `true` if an attribute has a measured value, or if a design has a requirement that
-/// bounds it.
-fn is_measured(knowledge: &Knowledge, attribute: &str) -> bool {
-    let view = knowledge.view();
-    let local = ontology::vocab::local_name(attribute);
-    view.measurements().iter().any(|measurement| measurement.attribute == local)
-        || view
-            .function_designs()
-            .iter()
-            .any(|design| design.requirements.iter().any(|r| r.attribute == local))
+/// Returns the reason why a measurement of an attribute is refused, if
+/// [`uses_measurement`](crate::knowledge::Knowledge::uses_measurement) is `false` for it.
+pub fn unused_measurement(attribute: &str) -> String {
+    format!(
+        "`{attribute}` is estimated for designs; nothing measures it, no design has a bound on it, and no rule reads it"
+    )
 }

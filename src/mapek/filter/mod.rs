@@ -122,6 +122,11 @@ impl Filters {
         }
     }
 
+    /// Returns `true` if there is a filter for the attribute, given by local name.
+    pub(crate) fn has(&self, attribute: &str) -> bool {
+        self.measured.contains_key(attribute)
+    }
+
     /// Returns the initial states. The values stated by the knowledge base are believed, and so are the stated statuses
     /// of components that have not failed.
     pub(crate) fn states(&self, knowledge: Option<&Knowledge>) -> FilterStates {

@@ -2,6 +2,7 @@
 
 mod base;
 mod catalogue;
+mod reads;
 mod reports;
 mod sources;
 mod statement;

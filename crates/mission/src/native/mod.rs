@@ -106,8 +106,24 @@ impl CoAdaptation {
         }
         let (chosen, changed) = attributes(domain, problem, view, &designs, bindings);
         let adaptation = Self { actions, chosen, changed };
-        let errors = adaptation.errors(domain);
+        let mut errors = adaptation.errors(domain);
+        errors.extend(adaptation.valued(problem));
         if errors.is_empty() { Ok(Some(adaptation)) } else { Err(errors.into()) }
+    }
+
+    /// Returns errors for the functions that a sum replaces, although the problem gives them a value.
+    fn valued(&self, problem: &Problem) -> Vec<Message> {
+        let chosen = self.chosen.iter().map(|(function, attribute)| (function, "chosen", attribute));
+        let changed = self.changed.iter().map(|(function, attribute)| (function, "reconfigured", attribute));
+        let valued = chosen.chain(changed).filter(|(function, ..)| has_value(problem, function));
+        let error = |(function, kind, attribute): (&Name, &str, &String)| {
+            let text = format!(
+                "`{function}` is bound to `{kind}:{attribute}`, but the problem gives it a value; remove the binding, \
+                 or the value and all its other uses"
+            );
+            Message::error("M233", text)
+        };
+        valued.map(error).collect()
     }
 
     fn errors(&self, domain: &Domain) -> Vec<Message> {
@@ -445,11 +461,6 @@ fn attributes(
 ) -> (BTreeMap<Name, String>, BTreeMap<Name, String>) {
     let estimated = estimated(designs.iter());
     let measured: BTreeSet<String> = view.measurements().into_iter().map(|m| m.attribute).collect();
-    let valued = |name: &Name| {
-        problem.init.iter().any(|element| {
-            matches!(element, pddl::ast::InitialElement::Value(atom, _, _) if atom.predicate.name == *name)
-        })
-    };
     let (mut chosen, mut changed) = (BTreeMap::new(), BTreeMap::new());
     for declared in domain.functions.iter().filter(|declared| declared.parameters.is_empty()) {
         let name = &declared.identifier.name;
@@ -459,12 +470,18 @@ fn attributes(
             chosen.insert(name.clone(), attribute);
         } else if let Some(attribute) = estimated.iter().find(|attribute| Name::new(attribute) == *name)
             && !measured.contains(attribute)
-            && !valued(name)
+            && !has_value(problem, name)
         {
             chosen.insert(name.clone(), attribute.clone());
         }
     }
     (chosen, changed)
+}
+
+fn has_value(problem: &Problem, function: &Name) -> bool {
+    problem.init.iter().any(|element| {
+        matches!(element, pddl::ast::InitialElement::Value(atom, _, _) if atom.predicate.name == *function)
+    })
 }
 
 fn estimated<'a>(designs: impl Iterator<Item = &'a FunctionDesign>) -> BTreeSet<String> {
