@@ -27,6 +27,8 @@ pub struct ChangesAnswer<'a> {
     changes: Vec<ChangePart<'a>>,
     /// Whether all values were examined; if not, a limit was reached.
     complete: bool,
+    /// Comparisons of measurements in rules that were not examined, in words.
+    unexamined: &'a [String],
 }
 
 /// Explanation of one design.
@@ -64,6 +66,8 @@ pub struct DesignAnswer<'a> {
     /// Whether each plan of this answer is proved optimal, or proved not to exist; if not, a limit
     /// was reached or reasoning failed.
     complete: bool,
+    /// Changes of the situation that were not examined, in words.
+    unexamined: &'a [String],
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -133,6 +137,7 @@ impl<'a> ChangesAnswer<'a> {
             best: BestPart::of(&found.best),
             changes: found.changes.iter().map(ChangePart::of).collect(),
             complete: found.complete,
+            unexamined: &found.unexamined,
         }
     }
 }
@@ -156,6 +161,7 @@ impl<'a> DesignAnswer<'a> {
             causes: availability.causes.iter().map(CausePart::of).collect(),
             repairs: found.repairs.iter().map(RepairPart::of).collect(),
             complete: found.complete,
+            unexamined: &availability.unexamined,
         }
     }
 }

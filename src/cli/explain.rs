@@ -223,7 +223,10 @@ fn repairs_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, repairs, .. } = found;
     let mut text = String::new();
     if repairs.is_empty() && !availability.available {
-        return "no recovery of components and no change of measurements makes it available\n".to_owned();
+        let tried = if availability.unexamined.is_empty() { "" } else { " that was tried" };
+        text += "no recovery of components and no change of measurements";
+        text += tried;
+        text += " makes it available\n";
     }
     let (singles, groups): (Vec<_>, Vec<_>) =
         repairs.iter().partition(|repair| repair.alterations.len() == 1);
@@ -248,11 +251,15 @@ fn repairs_text(found: &DesignExplanation) -> String {
         let _ = writeln!(text, "then {}", cost_text(&repair.then, best));
         text += &plan_text(&repair.then);
     }
-    text
+    text + &unexamined_text(&availability.unexamined)
+}
+
+fn unexamined_text(unexamined: &[String]) -> String {
+    unexamined.iter().fold(String::new(), |text, line| text + "not examined: " + line + "\n")
 }
 
 fn changes_text(found: &SmallestChanges) -> String {
-    let SmallestChanges { best, changes, complete, .. } = found;
+    let SmallestChanges { best, changes, complete, unexamined, .. } = found;
     let mut text = match (&best.cost, best.proved) {
         (None, true) => "there is no plan\n".to_owned(),
         (None, false) => "no plan was found before a limit was reached\n".to_owned(),
@@ -263,7 +270,10 @@ fn changes_text(found: &SmallestChanges) -> String {
         }
     };
     match (changes.is_empty(), complete) {
-        (true, true) => return text + "no change of one measurement leads to another plan\n",
+        (true, true) if unexamined.is_empty() => {
+            return text + "no change of one measurement leads to another plan\n";
+        }
+        (true, true) => text += "no change of one measurement that was tried leads to another plan\n",
         (true, false) => {}
         (false, _) => text += "the smallest changes that lead to another plan\n",
     }
@@ -277,7 +287,7 @@ fn changes_text(found: &SmallestChanges) -> String {
     if !complete {
         text += "a limit was reached: other changes were not examined\n";
     }
-    text
+    text + &unexamined_text(unexamined)
 }
 
 fn millionth() -> BigRational {

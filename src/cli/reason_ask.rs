@@ -21,7 +21,8 @@ use crate::cli::situation::Imports;
 /// Questions; at most one kind at a time.
 #[derive(Debug, Args)]
 pub struct Questions {
-    /// Check whether the statements of a document are entailed, and explain why (repeatable).
+    /// Check whether the statements of a document are entailed, and explain why. Rules and definitions of datatypes
+    /// are not checked, and ranges that enumerate literals are not shown (repeatable).
     #[arg(long, value_name = "FILE", group = "question")]
     entails: Vec<PathBuf>,
     /// Show the inferred hierarchies of classes and properties, and empty classes and properties.

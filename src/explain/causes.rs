@@ -14,9 +14,11 @@ use num_rational::BigRational;
 use ontology::tomasys::change::Status as Component;
 use ontology::tomasys::{FunctionDesign, Requirement};
 use planner::Limits;
+use std::cell::Cell;
 use std::cmp::Ordering;
 
 use crate::explain::parts::{Alteration, BestPlan, Change, Repair, Target};
+use crate::explain::rule_bounds::{RuleBounds, rule_bounds};
 use crate::explain::solve::best;
 use crate::explain::thresholds::measured;
 use crate::knowledge::Knowledge;
@@ -46,6 +48,17 @@ pub struct Availability {
     /// there are many. All alterations of a set together suffice, and none of them was found to be superfluous.
     /// If the design is available: sets of one alteration, each of which makes it unavailable.
     pub ways: Vec<Vec<Alteration>>,
+    /// Alterations that were not examined, in words. If this list is empty and `ways` is empty, too, no recoveries and
+    /// no changes of measurements make the design available.
+    pub unexamined: Vec<String>,
+}
+
+/// Sets of alterations that make a design available.
+struct Ways {
+    /// Minimal sets of alterations.
+    sets: Vec<Vec<Alteration>>,
+    /// Alterations that were not examined, in words.
+    unexamined: Vec<String>,
 }
 
 /// A failed component or a measurement that contributes to ruling a design out.
@@ -83,7 +96,7 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     if design.available {
         return Causes { causes: Vec::new(), are_all_needed: false };
     }
-    let ways = ways(knowledge, design);
+    let ways = ways(knowledge, design).sets;
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
@@ -105,11 +118,25 @@ fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alterat
 
 /// Returns minimal sets of alterations that make a design available (see [`repairs`]). Alterations that concern only
 /// other designs are tried only if the alterations that concern this design do not suffice.
-fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> {
-    let candidates = candidates(knowledge, design);
-    let ways = repairs(knowledge, design, &candidates);
+fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Ways {
+    let bounds = rule_bounds(knowledge);
+    let mut unexamined = unexamined(&bounds);
+    let candidates = candidates(knowledge, design, &bounds);
+    let (sets, _) = repairs(knowledge, design, &candidates);
+    if !sets.is_empty() {
+        return Ways { sets, unexamined };
+    }
     // Rules may depend on more than the design's own requirements.
-    if ways.is_empty() { repairs(knowledge, design, &all_candidates(knowledge, candidates)) } else { ways }
+    let (sets, all_tried) = repairs(knowledge, design, &all_candidates(knowledge, candidates, &bounds));
+    if sets.is_empty() && !all_tried {
+        unexamined.push("some combinations of changes".to_owned());
+    }
+    Ways { sets, unexamined }
+}
+
+/// Describes the comparisons that are not among the bounds.
+pub(super) fn unexamined(bounds: &RuleBounds) -> Vec<String> {
+    bounds.unexamined.iter().map(|rule| format!("comparisons of measurements in the rule `{rule}`")).collect()
 }
 
 pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
@@ -121,17 +148,22 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         because: against(mission, &design.individual.name),
         causes: Vec::new(),
         ways: Vec::new(),
+        unexamined: Vec::new(),
     };
     let Some(knowledge) = mission.knowledge() else { return availability };
     if design.available {
         let loses = |alteration: &Alteration| {
             altered(knowledge, [alteration]).is_some_and(|knowledge| !is_available(&knowledge, design))
         };
-        let candidates = candidates(knowledge, design).into_iter();
+        let bounds = rule_bounds(knowledge);
+        let candidates = candidates(knowledge, design, &bounds).into_iter();
         availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
+        availability.unexamined = unexamined(&bounds);
         return availability;
     }
-    availability.ways = ways(knowledge, design);
+    let Ways { sets, unexamined } = ways(knowledge, design);
+    availability.ways = sets;
+    availability.unexamined = unexamined;
     availability.causes = causes_of(knowledge, design, &availability.ways);
     let derived = ruled_out(knowledge, &design.individual.name);
     for line in availability.causes.iter().flat_map(|cause| &cause.because).chain(&derived) {
@@ -143,22 +175,31 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
 }
 
 /// Returns minimal sets of `candidates` that make a design available (see [`minimal`]). At most
-/// [`MAX_TRIED`] sets are tried, small ones first, so some minimal sets may be missing.
+/// [`MAX_TRIED`] sets are tried, small ones first, so some minimal sets may be missing. Also returns `true` if all sets
+/// were tried, and reasoning did not fail.
 fn repairs(
     knowledge: &Knowledge,
     design: &FunctionDesign,
     candidates: &[Alteration],
-) -> Vec<Vec<Alteration>> {
+) -> (Vec<Vec<Alteration>>, bool) {
+    let has_failed = Cell::new(false);
     let suffice = |set: &[&Alteration]| {
-        altered(knowledge, set.iter().copied()).is_some_and(|knowledge| is_available(&knowledge, design))
+        let altered = altered(knowledge, set.iter().copied());
+        has_failed.set(has_failed.get() || altered.is_none());
+        altered.is_some_and(|knowledge| is_available(&knowledge, design))
     };
     let available_changes: Vec<&Alteration> = candidates.iter().collect();
     let without = |alteration: &Alteration| {
         available_changes.iter().copied().filter(|other| *other != alteration).collect::<Vec<_>>()
     };
-    // An alteration that no others can replace is in every set.
+    // An alteration that no others can replace is in every set. If there are several alterations of a value, without
+    // the last one another one has an effect, which may be harmful.
+    let is_only = |alteration: &Alteration| {
+        available_changes.iter().filter(|other| other.name == alteration.name).count() == 1
+    };
     let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if suffice(&available_changes) {
-        available_changes.iter().copied().partition(|alteration| !suffice(&without(alteration)))
+        let is_needed = |alteration: &&Alteration| is_only(alteration) && !suffice(&without(alteration));
+        available_changes.iter().copied().partition(is_needed)
     } else {
         (Vec::new(), available_changes.clone())
     };
@@ -186,7 +227,10 @@ fn repairs(
     if minimal_sets.is_empty() && suffice(&available_changes) {
         minimal_sets.push(minimal(available_changes, &suffice));
     }
-    minimal_sets.into_iter().map(|set| set.into_iter().cloned().collect()).collect()
+    let sets = minimal_sets.into_iter().map(|set| set.into_iter().cloned().collect()).collect();
+    // The empty set is tried in addition to the subsets.
+    let all_tried = subsets(rest.len()).nth(MAX_TRIED - 1).is_none();
+    (sets, all_tried && !has_failed.get())
 }
 
 /// Returns the non-empty subsets of the positions 0 to `count` − 1: smaller subsets first, and subsets of one
@@ -288,8 +332,9 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
 
 /// Returns alterations that may change whether a design is available: of its components, and of
 /// measurements. New measurements are at or just beyond the bounds in the design's requirements.
-/// Without a requirement for an attribute, they are around the design's estimation.
-fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration> {
+/// Without a requirement for an attribute, they are around the design's estimation. Further measurements are at or just
+/// beyond bounds in rules that concern the design.
+fn candidates(knowledge: &Knowledge, design: &FunctionDesign, rules: &RuleBounds) -> Vec<Alteration> {
     let is_own = |component: &str| design.components.iter().any(|needed| needed.iri == component);
     let mut alterations = components(knowledge, design.available, &is_own);
     for (attribute, from) in measured(knowledge) {
@@ -305,14 +350,26 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration>
             alterations.push(Alteration { name: attribute.clone(), from: Some(from.clone()), to });
         }
     }
+    let bounds = rules.bounds.iter().filter(|bound| bound.concerns(&design.individual.iri));
+    for bound in bounds.filter(|bound| design.available || bound.can_help()) {
+        if !alterations.contains(&bound.alteration) {
+            alterations.push(bound.alteration.clone());
+        }
+    }
     alterations
 }
 
 /// Adds alterations that concern all designs to `candidates_found`: recoveries of failed
 /// components, and changes of measurements. Failures are not added.
-fn all_candidates(knowledge: &Knowledge, mut candidates_found: Vec<Alteration>) -> Vec<Alteration> {
+fn all_candidates(
+    knowledge: &Knowledge,
+    mut candidates_found: Vec<Alteration>,
+    rules: &RuleBounds,
+) -> Vec<Alteration> {
     let designs = knowledge.view().function_designs();
-    let additional = designs.iter().flat_map(|design| candidates(knowledge, design));
+    let additional = designs.iter().flat_map(|design| candidates(knowledge, design, rules));
+    let bounds = rules.bounds.iter().filter(|bound| bound.is_deciding());
+    let additional = additional.chain(bounds.map(|bound| bound.alteration.clone()));
     for alteration in components(knowledge, false, &|_| true).into_iter().chain(additional) {
         if alteration.to != Target::Failed && !candidates_found.contains(&alteration) {
             candidates_found.push(alteration);

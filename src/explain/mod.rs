@@ -2,14 +2,16 @@
 //! another plan.
 //!
 //! Availability is explained by reasoning without planning: [`availability`]. "Why is this design not chosen?" is
-//! answered by planning again with this design as the only one for its functions, as if it were available. The metric
-//! of this plan minus that of the best plan is the price of the design. "What would change the plan?" is answered by
-//! planning with other values. A measured attribute is set to the values at which a requirement begins or ceases to
-//! hold. A numeric value of the problem, such as a battery, is varied by bisection between a value with the current
-//! plan and a value with another plan.
+//! answered by planning again with this design as the only one for its functions, as if it were available. The
+//! metric of this plan minus that of the best plan is the price of the design. "What would change the plan?" is
+//! answered by planning with other values. A measured attribute is set to the values at which a requirement begins
+//! or ceases to hold, or at which the outcome of a comparison with a number in a rule changes. A numeric value of
+//! the problem, such as a battery, is varied by bisection between a value with the current plan and a value with
+//! another plan.
 
 mod causes;
 mod parts;
+mod rule_bounds;
 mod solve;
 mod thresholds;
 

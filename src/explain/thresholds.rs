@@ -6,7 +6,9 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use planner::Limits;
 
+use crate::explain::causes::unexamined;
 use crate::explain::parts::{Alteration, BestPlan, Change, Target, little};
+use crate::explain::rule_bounds::{RuleBounds, rule_bounds};
 use crate::explain::solve::best;
 use crate::knowledge::Knowledge;
 use crate::message::Errors;
@@ -26,12 +28,15 @@ pub struct SmallestChanges {
     pub changes: Vec<Change>,
     /// `true` if all values were examined; `false` if a limit was reached.
     pub complete: bool,
+    /// Comparisons of measurements in rules that were not examined, in words.
+    pub unexamined: Vec<String>,
 }
 
 /// Searches for the smallest changes of single values that lead to another plan. Each measured attribute is set to
-/// the values, below and above the current one, at which a requirement of a design begins or ceases to hold. Each
-/// positive numeric value of the problem is changed downwards and upwards by at most 100 %. At a limit, returns the
-/// partial results. `hear` is called with `the best plan` and then with the name of each value, before the search.
+/// the values, below and above the current one, at which a requirement of a design begins or ceases to hold, or at
+/// which the outcome of a comparison with a number in a rule changes. Each positive numeric value of the problem is
+/// changed downwards and upwards by at most 100 %. At a limit, returns the partial results. `hear` is called with
+/// `the best plan` and then with the name of each value, before the search.
 ///
 /// # Errors
 /// The mission cannot be planned for.
@@ -42,11 +47,13 @@ pub fn smallest_changes(
 ) -> Result<SmallestChanges, Errors> {
     hear("the best plan");
     let base = best(mission, limits)?;
-    let mut result = SmallestChanges { best: base, changes: Vec::new(), complete: false };
+    let bounds = mission.knowledge().map(rule_bounds).unwrap_or_default();
+    let unexamined = unexamined(&bounds);
+    let mut result = SmallestChanges { best: base, changes: Vec::new(), complete: false, unexamined };
     if !result.best.proved {
         return Ok(result);
     }
-    let tried = VariedMission { mission, base: result.best.clone(), limits };
+    let tried = VariedMission { mission, base: result.best.clone(), bounds, limits };
     let attributes = mission.knowledge().map(measured).unwrap_or_default();
     for (attribute, from) in attributes {
         hear(&attribute);
@@ -86,6 +93,7 @@ enum Outcome {
 struct VariedMission<'a> {
     mission: &'a Mission,
     base: BestPlan,
+    bounds: RuleBounds,
     limits: &'a Limits,
 }
 
@@ -116,8 +124,26 @@ impl VariedMission<'_> {
         steps(plan) != steps(&self.base) || plan.cost.is_some() != self.base.cost.is_some()
     }
 
+    /// Returns the values of an attribute, above or below `from`, at which a requirement of a design
+    /// begins or ceases to hold, or the outcome of a comparison in a rule changes, in ascending distance.
+    fn thresholds(&self, attribute: &str, from: &BigRational, upwards: bool) -> Vec<Target> {
+        let mut targets = required(self.mission, attribute, from, upwards);
+        let bounds = self.bounds.bounds.iter().map(|bound| &bound.alteration);
+        let bounds = bounds.filter(|alteration| alteration.name == attribute);
+        let ahead = |target: &&Target| (target.example() > *from) == upwards;
+        targets.extend(bounds.map(|alteration| &alteration.to).filter(ahead).cloned());
+        let distance = |target: &Target| {
+            let distance = target.example() - from;
+            if upwards { distance } else { -distance }
+        };
+        targets.sort_by_key(distance);
+        // Several designs may have the same requirement.
+        targets.dedup();
+        targets
+    }
+
     fn first_threshold(&self, attribute: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
-        for target in thresholds(self.mission, attribute, from, upwards) {
+        for target in self.thresholds(attribute, from, upwards) {
             let Some(then) = self.with(attribute, &target.example())? else { return Ok(Outcome::AtLimit) };
             if self.is_other(&then) {
                 return Ok(Outcome::Found(Box::new(change(attribute, from, target, None, then))));
@@ -224,8 +250,8 @@ fn shortest_decimal(low: &BigRational, high: &BigRational) -> BigRational {
 }
 
 /// Returns the values of an attribute, above or below `from`, at which a requirement of a design
-/// begins or ceases to hold, in ascending distance.
-fn thresholds(mission: &Mission, attribute: &str, from: &BigRational, upwards: bool) -> Vec<Target> {
+/// begins or ceases to hold.
+fn required(mission: &Mission, attribute: &str, from: &BigRational, upwards: bool) -> Vec<Target> {
     let designs =
         mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
     let requirements = designs.iter().flat_map(|design| &design.requirements);
@@ -246,13 +272,6 @@ fn thresholds(mission: &Mission, attribute: &str, from: &BigRational, upwards: b
             }
         }
     }
-    let distance = |target: &Target| {
-        let distance = target.example() - from;
-        if upwards { distance } else { -distance }
-    };
-    targets.sort_by_key(distance);
-    // Several designs may have the same requirement.
-    targets.dedup();
     targets
 }
 

@@ -1,8 +1,10 @@
 //! Tests of `metaplan explain`: reasons, costs of alternatives, and changes that would lead to another answer.
 
+use std::collections::BTreeSet;
+
 use serde_json::{Value, json};
 
-use crate::common::metaplan;
+use crate::common::{copy_folder, metaplan, metaplan_in, root};
 
 fn explain(arguments: &[&str]) -> Value {
     let command: Vec<&str> =
@@ -87,7 +89,7 @@ fn bounds_of_small_values_are_found() {
         "(define (problem p) (:domain d) (:init (= (x) 0.0005) (= (c) 0)) (:goal (done))
          (:metric minimize (c)))",
     );
-    let knowledge = crate::common::root().join("ontology/kb/ugv.ttl");
+    let knowledge = root().join("ontology/kb/ugv.ttl");
     write(
         "m.toml",
         &format!(
@@ -107,4 +109,114 @@ fn unknown_designs_are_usage_errors() {
     let outcome = metaplan(&["explain", "missions/ugv.toml", "fd_none"]);
     assert_eq!(outcome.status, 2);
     assert!(outcome.stderr.contains("there are: fd_amcl_kinect"), "{outcome:#?}");
+}
+
+/// Own rules about `fd_first`, the cheaper one of two designs.
+const FOG: &str = "[fog] t:isQAtype(?q, r:humidity) ^ t:isMeasured(?q, true) ^ t:hasValue(?q, ?h)
+    ^ swrlb:greaterThan(?h, 90) -> t:fd_realisability(r:fd_first, false) .\n";
+const DRIFT: &str = "[drift] t:isQAtype(?w, r:wind) ^ t:hasValue(?w, ?wind) ^ swrlb:lessThan(6, ?wind)
+    ^ t:hasValue(r:obs_humidity, ?h) ^ swrlb:greaterThanOrEqual(?h, 50)
+    -> t:fd_realisability(r:fd_first, false) .\n";
+const COMPUTED: &str =
+    "[computed] t:isQAtype(?q, r:humidity) ^ t:hasValue(?q, ?h) ^ swrlb:multiply(?d, ?h, 2)
+    ^ swrlb:greaterThan(?d, 180) -> t:fd_realisability(r:fd_first, false) .\n";
+const NEVER: &str = "[never] t:requiresC(?fd, r:c_first) -> t:fd_realisability(?fd, false) .\n";
+
+/// Explains, with own rules in addition to the shipped ones. `arguments` follow the mission.
+fn explain_with(rules: &[&str], arguments: &str, format: &str) -> String {
+    let folder = tempfile::tempdir().expect("a directory");
+    copy_folder(&root().join("missions/templates/blank"), folder.path());
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a file");
+    let measured = [("humidity", 40), ("wind", 3)].map(|(name, value)| {
+        format!(
+            ":{name} a t:QualityAttributeType .\n:obs_{name} a t:QAvalue ; t:isQAtype :{name} ; \
+             t:isMeasured true ; t:hasValue {value} .\n"
+        )
+    });
+    write("robot.ttl", &(read("robot.ttl") + "\n" + &measured.concat()));
+    let manifest = read("mission.toml");
+    let files = "files = [\"robot.ttl\"]\n";
+    assert!(manifest.contains(files), "{manifest}");
+    let with_rules = format!("{files}rules = [\"coadaptation\", \"own.swrl\"]\n");
+    write("mission.toml", &manifest.replace(files, &with_rules));
+    let prefixes =
+        "@prefix t: <http://metacontrol.org/tomasys#> .\n@prefix r: <http://example.org/robot#> .\n";
+    write("own.swrl", &(prefixes.to_owned() + &rules.concat()));
+    let command: Vec<&str> = ["explain", "mission.toml"]
+        .into_iter()
+        .chain(arguments.split_whitespace())
+        .chain(["--format", format])
+        .collect();
+    let outcome = metaplan_in(folder.path(), &command, "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    outcome.stdout
+}
+
+fn json_with(rules: &[&str], arguments: &str) -> Value {
+    serde_json::from_str(&explain_with(rules, arguments, "json")).expect("JSON")
+}
+
+/// Checks the sets of changes that make `fd_first` available, each as text `name relation bound`.
+#[track_caller]
+fn check_repairs(rules: &[&str], situation: &str, expected: &[&[&str]]) -> Value {
+    let answer = json_with(rules, &format!("fd_first {situation}"));
+    assert_eq!(answer["available"], false, "{answer:#}");
+    let list = |value: &Value| value.as_array().expect("a list").clone();
+    let change = |change: &Value| {
+        let name = change["name"].as_str().expect("a name");
+        let relation = change["relation"].as_str().expect("a relation");
+        change["bound"].as_f64().map_or(name.to_owned(), |bound| format!("{name} {relation} {bound}"))
+    };
+    let repairs: BTreeSet<BTreeSet<String>> = list(&answer["repairs"])
+        .iter()
+        .map(|repair| list(&repair["changes"]).iter().map(change).collect())
+        .collect();
+    let expected: BTreeSet<BTreeSet<String>> =
+        expected.iter().map(|set| set.iter().map(|text| (*text).to_owned()).collect()).collect();
+    assert_eq!(repairs, expected, "{answer:#}");
+    answer
+}
+
+#[test]
+fn bounds_in_own_rules_are_candidates_for_changes() {
+    let answer = check_repairs(&[FOG], "--set humidity=95", &[&["humidity at_most 90"]]);
+    assert_eq!(json!([answer["unexamined"], answer["repairs"][0]["then"]["cost"]]), json!([[], 1]));
+    let situation = "--set wind=7 --set humidity=60";
+    check_repairs(&[DRIFT], situation, &[&["humidity below 50"], &["wind at_most 6"]]);
+}
+
+#[test]
+fn causes_by_own_rules_are_listed_with_the_others() {
+    let situation = "--fail c_first --set wind=7 --set humidity=95";
+    let expected: [&[&str]; 2] =
+        [&["c_first", "humidity below 50"], &["c_first", "humidity at_most 90", "wind at_most 6"]];
+    let because = check_repairs(&[FOG, DRIFT], situation, &expected)["because"].to_string();
+    for reason in ["rule: fog", "rule: drift", "c_status(c_first"] {
+        assert!(because.contains(reason), "{reason}: {because}");
+    }
+}
+
+/// Only a complete search justifies the claim that nothing makes a design available.
+#[test]
+fn comparisons_that_are_not_examined_are_listed() {
+    let answer = check_repairs(&[COMPUTED], "--set humidity=95", &[]);
+    let unexamined = "comparisons of measurements in the rule `computed`";
+    assert_eq!(answer["unexamined"], json!([unexamined]));
+    let text = explain_with(&[COMPUTED], "fd_first --set humidity=95", "text");
+    let claim = "no recovery of components and no change of measurements that was tried makes it available\n";
+    assert!(text.ends_with(&format!("{claim}not examined: {unexamined}\n")), "{text}");
+    assert_eq!(json_with(&[COMPUTED], "")["unexamined"], json!([unexamined]));
+    let answer = check_repairs(&[NEVER], "--fail c_second", &[]);
+    assert_eq!(answer["unexamined"], json!([]));
+    let text = explain_with(&[NEVER], "fd_first", "text");
+    let claim = "no recovery of components and no change of measurements makes it available\n";
+    assert!(text.ends_with(claim), "{text}");
+}
+
+#[test]
+fn bounds_in_own_rules_lead_to_another_plan() {
+    let answer = json_with(&[FOG], "--set humidity=89 --fail c_second");
+    assert_eq!(answer["best"]["cost"], 1);
+    assert_eq!(changes(&answer), [json!(["humidity", "above", 90, null])]);
 }
