@@ -2,7 +2,7 @@
 //! optimum.
 
 use metaplan_planner::{
-    Backend, Config, GroundConfig, MetricUnbounded, Proof, Status, StepSemantics, ground, optimize,
+    Backend, Config, Engine, GroundConfig, MetricUnbounded, Proof, Status, StepSemantics, ground, optimize,
 };
 use pddl::{Source, read};
 
@@ -139,4 +139,40 @@ fn contradictory_changes_leave_an_action_inapplicable() {
     // If the contradiction depends on the state, the truth of `lit` matters.
     assert_eq!(solve("(assign (x) 5) (when (not (lit)) (increase (x) 1))"), Ok(Some(2)));
     assert_eq!(solve("(assign (x) 5) (assign (x) (+ (x) 3))"), Err(1));
+}
+
+/// Each preference is evaluated by a hidden step at the end of the plan. The horizon counts only actions.
+#[test]
+fn a_horizon_does_not_count_evaluations_of_preferences() {
+    let domain = "(define (domain d) (:requirements :strips :preferences) (:predicates (p) (q) (r))
+      (:action a :parameters () :precondition (and) :effect (q))
+      (:action b :parameters () :precondition (q) :effect (r)))";
+    let solve = |goal: &str, horizon: usize, engine: Engine| {
+        let problem = format!(
+            "(define (problem x) (:domain d) (:init (p))
+               (:goal (and {goal} (preference g (p)) (preference g (not (q))))) (:metric minimize (is-violated g)))"
+        );
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+        let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+        let config = Config::default().with_engine(engine).with_horizon(horizon);
+        optimize(&task, &config, &mut |better| assert!(better.horizon <= 2, "{better:?}"))
+    };
+    for engine in [Engine::Portfolio, Engine::Search, Engine::Sat] {
+        // The goal, the least number of actions of a plan, and the least metric.
+        for (goal, least, metric) in [("(p)", 0, "0"), ("(q)", 1, "1"), ("(r)", 2, "1")] {
+            for horizon in 0..4 {
+                let solution = solve(goal, horizon, engine);
+                let about = format!("{goal}, horizon {horizon}, {engine:?}: {solution:?}");
+                let Some(plan) = &solution.plan else {
+                    assert!(horizon < least, "{about}");
+                    assert_eq!(solution.status, Status::UnsolvableWithinHorizon, "{about}");
+                    assert_eq!(solution.horizon, horizon, "{about}");
+                    continue;
+                };
+                assert!(horizon >= least && plan.steps.len() <= horizon, "{about}");
+                assert_eq!(plan.cost.to_string(), metric, "{about}");
+            }
+        }
+    }
 }

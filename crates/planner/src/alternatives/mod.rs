@@ -20,6 +20,7 @@ use task::plan::solution::{Solution, Status};
 use task::plan::{Plan, decode};
 use task::task::Task;
 
+use crate::optimize::hidden_steps::with_evaluations;
 use crate::optimize::{Config, Engine};
 
 use choices::{Choice, forced, shares};
@@ -39,6 +40,7 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     let context = Context::new(task, &config.limits);
     let unknown = Alternatives { plans: Vec::new(), complete: false, forced: None };
     let Ok(bounds) = Bounds::new(context) else { return Some(unknown) };
+    let config = &with_evaluations(task, config);
     let by_graph = if config.engine == Engine::Sat || config.horizon.is_some() {
         None
     } else {

@@ -27,6 +27,7 @@ use task::task::timing::Timing;
 use task::task::{Condition, NumericEffect, Objective, Operator, State, Task};
 
 use crate::exact::integer_scaling::Integral;
+use crate::optimize::hidden_steps::{with_evaluations, without_hidden_steps};
 use crate::optimize::{Config, can_repeat_reward};
 use pddl::ast::{Domain, Problem};
 
@@ -66,6 +67,7 @@ impl ExactTask {
 pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     let started = Instant::now();
     let task = &task.0;
+    let config = &with_evaluations(task, config);
     let mut solution = match &task.unreachable {
         Some(reason) => answer(Status::Unsolvable, None, Some(Proof::Relaxation(reason.clone()))),
         None if task.operators.iter().any(|operator| operator.cost.minimum().is_negative()) => {
@@ -75,7 +77,7 @@ pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     };
     solution.statistics.operators = task.operators.len();
     solution.statistics.search = started.elapsed();
-    solution
+    without_hidden_steps(task, solution)
 }
 
 fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {

@@ -6,6 +6,7 @@ use tracing::info_span;
 
 use crate::optimize::branch_and_bound::minimise;
 use crate::optimize::config::Config;
+use crate::optimize::hidden_steps::{evaluations, with_evaluations, without_hidden_steps};
 use crate::optimize::optimizer_run::Run;
 use crate::optimize::solve::solve;
 use crate::optimize::unbounded_metric::shortest_then_best;
@@ -39,6 +40,15 @@ use crate::optimize::unbounded_metric::shortest_then_best;
 /// # }
 /// ```
 pub fn optimize(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Solution {
+    let evaluations = evaluations(task);
+    let mut report = |improvement: Improvement| {
+        report(Improvement { horizon: improvement.horizon.saturating_sub(evaluations), ..improvement });
+    };
+    without_hidden_steps(task, best(task, &with_evaluations(task, config), &mut report))
+}
+
+/// Like [`optimize`], but evaluations of preferences count as steps.
+fn best(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Solution {
     if task.objective.rest.is_empty() {
         return cheapest(task, config, report);
     }

@@ -12,6 +12,7 @@ mod branch_and_bound;
 mod cheapest;
 mod config;
 mod core_guided;
+pub(crate) mod hidden_steps;
 mod horizon_schedule;
 mod linear_search;
 mod objectives;

@@ -69,6 +69,12 @@ pub fn is_violation(action: &str) -> bool {
     is_hidden(action) && action.ends_with(preferences::VIOLATION)
 }
 
+/// Returns `true` if the name belongs to an auxiliary action that evaluates a preference as satisfied. Every sequential
+/// plan ends with one evaluation for each of these actions, as satisfied or as violated.
+pub fn is_satisfaction(action: &str) -> bool {
+    is_hidden(action) && action.ends_with(preferences::SATISFACTION)
+}
+
 /// Returns `true` if the name belongs to an auxiliary function, which counts violations of a preference.
 pub(crate) fn is_violation_count(function: &Name) -> bool {
     preferences::is_count(function)

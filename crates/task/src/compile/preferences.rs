@@ -26,6 +26,8 @@ use super::syntax_edits::{PreferenceInstance, declare, happen, hidden, require};
 const GOING_ON: &str = "the plan goes on";
 
 pub(super) const VIOLATION: &str = " is violated";
+/// End of the names of hidden actions that evaluate a preference of a sequential plan as satisfied.
+pub(super) const SATISFACTION: &str = " is met";
 
 /// Atom that hidden actions add if actions may overlap. It is never true, because these actions are never executed.
 const VIOLATED: &str = "a preference is violated";
@@ -87,7 +89,7 @@ fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInst
         // they change no atom of the goal.
         let ready = all([holds(&before)].into_iter().chain(first.take()));
         let pass = [Effect::Delete(flag(&before)), Effect::Add(flag(&after))];
-        let met = (format!("preference {number} is met"), condition.clone(), None);
+        let met = (format!("preference {number}{SATISFACTION}"), condition.clone(), None);
         let violated = (format!("preference {number}{VIOLATION}"), not(condition), Some(violate(&name)));
         for (own, condition, cost) in [met, violated] {
             let body = ActionBody::Instantaneous {
