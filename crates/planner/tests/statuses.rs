@@ -158,7 +158,7 @@ fn a_horizon_does_not_count_evaluations_of_preferences() {
         let config = Config::default().with_engine(engine).with_horizon(horizon);
         optimize(&task, &config, &mut |better| assert!(better.horizon <= 2, "{better:?}"))
     };
-    for engine in [Engine::Portfolio, Engine::Search, Engine::Sat] {
+    for engine in [Engine::Auto, Engine::Search, Engine::Sat] {
         // The goal, the least number of actions of a plan, and the least metric.
         for (goal, least, metric) in [("(p)", 0, "0"), ("(q)", 1, "1"), ("(r)", 2, "1")] {
             for horizon in 0..4 {
