@@ -290,7 +290,9 @@ impl<'m, 'r> Planner<'m, 'r> {
         solution: &Solution,
         limit: usize,
     ) -> Result<Option<Alternatives>, Errors> {
-        let Some(mut found) = alternatives(task, solution, limit, &self.config) else {
+        // Building the result, and validating the plans, takes time that grows with that of the search.
+        let config = self.config.clone().with_limits(self.config.limits.half());
+        let Some(mut found) = alternatives(task, solution, limit, &config) else {
             return Ok(None);
         };
         let reading = Reading::sequential(task.is_timed());
