@@ -204,8 +204,8 @@ fn repairs(
         (Vec::new(), available_changes.clone())
     };
     let mut minimal_sets: Vec<Vec<&Alteration>> = Vec::new();
-    let subsets = std::iter::once(Vec::new()).chain(subsets(rest.len()));
-    for positions in subsets.take(MAX_TRIED) {
+    let all_positions = std::iter::once(Vec::new()).chain(subsets(rest.len()));
+    for positions in all_positions.take(MAX_TRIED) {
         let is_in = |alteration: &&Alteration| {
             needed.contains(alteration) || positions.iter().any(|position| rest[*position] == *alteration)
         };
