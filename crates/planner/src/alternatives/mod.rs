@@ -20,7 +20,7 @@ use task::plan::solution::{Solution, Status};
 use task::plan::{Plan, decode};
 use task::task::Task;
 
-use crate::optimize::hidden_steps::with_evaluations;
+use crate::optimize::hidden_steps::{evaluations, with_evaluations};
 use crate::optimize::{Config, Engine};
 
 use choices::{Choice, forced, shares};
@@ -46,7 +46,11 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     } else {
         by_graph(context, &bounds, first, most)
     };
-    by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).or(Some(unknown))
+    let mut found = by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).unwrap_or(unknown);
+    // The evaluations of preferences are no steps of the plan.
+    let actions = first.steps.len().saturating_sub(evaluations(task));
+    found.forced.iter_mut().for_each(|forced| forced.truncate(actions));
+    Some(found)
 }
 
 /// Finds further cheapest plans as paths of a graph. Returns `None` if graph search is not applicable to the task.
