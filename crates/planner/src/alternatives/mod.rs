@@ -49,7 +49,9 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     let mut found = by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).unwrap_or(unknown);
     // The evaluations of preferences are no steps of the plan.
     let actions = first.steps.len().saturating_sub(evaluations(task));
-    found.forced.iter_mut().for_each(|forced| forced.truncate(actions));
+    if let Some(forced) = &mut found.forced {
+        forced.truncate(actions);
+    }
     Some(found)
 }
 
