@@ -230,14 +230,14 @@ impl Setup {
     fn unknown_functions(&self, functions: &[String; 2]) -> Vec<Message> {
         let of_places =
             self.mission.domain().functions.iter().filter(|function| function.parameters.len() == 1);
-        let known: Vec<&Name> = of_places.map(|function| &function.identifier.name).collect();
+        let names: Vec<&Name> = of_places.map(|function| &function.identifier.name).collect();
         let mut wrong = Vec::new();
         for (index, function) in functions.iter().enumerate() {
             let name = Name::new(function);
-            if !known.contains(&&name) {
+            if !names.contains(&&name) {
                 let path: [Key; 3] = ["report".into(), "positions".into(), index.into()];
                 let place = self.origin.place_of(&path, Part::Value);
-                let suggestion = did_you_mean(function, known.iter().map(|other| other.as_str()));
+                let suggestion = did_you_mean(function, names.iter().map(|other| other.as_str()));
                 let text = format!(
                     "the domain has no function `{function}` with one parameter (a place){suggestion}"
                 );

@@ -120,7 +120,7 @@ fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alterat
 /// other designs are tried only if the alterations that concern this design do not suffice.
 fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Ways {
     let bounds = rule_bounds(knowledge);
-    let mut unexamined = unexamined(&bounds);
+    let mut unexamined = bounds.unexamined_comparisons();
     let candidates = candidates(knowledge, design, &bounds);
     let (sets, _) = repairs(knowledge, design, &candidates);
     if !sets.is_empty() {
@@ -132,11 +132,6 @@ fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Ways {
         unexamined.push("some combinations of changes".to_owned());
     }
     Ways { sets, unexamined }
-}
-
-/// Describes the comparisons that are not among the bounds.
-pub(super) fn unexamined(bounds: &RuleBounds) -> Vec<String> {
-    bounds.unexamined.iter().map(|rule| format!("comparisons of measurements in the rule `{rule}`")).collect()
 }
 
 pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
@@ -158,7 +153,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         let bounds = rule_bounds(knowledge);
         let candidates = candidates(knowledge, design, &bounds).into_iter();
         availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
-        availability.unexamined = unexamined(&bounds);
+        availability.unexamined = bounds.unexamined_comparisons();
         return availability;
     }
     let Ways { sets, unexamined } = ways(knowledge, design);

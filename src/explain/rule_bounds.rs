@@ -59,22 +59,32 @@ impl RuleBound {
     }
 }
 
+impl RuleBounds {
+    /// Describes the comparisons that are not among the bounds.
+    pub fn unexamined_comparisons(&self) -> Vec<String> {
+        self.unexamined
+            .iter()
+            .map(|rule| format!("comparisons of measurements in the rule `{rule}`"))
+            .collect()
+    }
+}
+
 /// Returns the bounds with which the rules of a knowledge base compare measured values.
 pub(super) fn rule_bounds(knowledge: &Knowledge) -> RuleBounds {
     let measurements = knowledge.view().measurements();
     let reader = Reader { engine: knowledge.engine(), measurements: &measurements };
     let deciding = reader.deciding();
     let carriers = reader.carriers();
-    let mut found = RuleBounds::default();
+    let mut result = RuleBounds::default();
     for rule in &reader.engine.program().rules {
         let is_deciding = concluded(rule).any(|predicate| deciding.contains(&predicate));
-        let is_examined = reader.read(rule, &carriers, is_deciding, &mut found.bounds);
+        let is_examined = reader.read(rule, &carriers, is_deciding, &mut result.bounds);
         if is_deciding && !is_examined {
             let label = rule.identity.label.as_ref().map(ToString::to_string);
-            found.unexamined.insert(label.unwrap_or_else(|| rule.identity.to_string()));
+            result.unexamined.insert(label.unwrap_or_else(|| rule.identity.to_string()));
         }
     }
-    found
+    result
 }
 
 /// Variables of a rule whose values depend on measured values.

@@ -6,7 +6,6 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use planner::Limits;
 
-use crate::explain::causes::unexamined;
 use crate::explain::parts::{Alteration, BestPlan, Change, Target, little};
 use crate::explain::rule_bounds::{RuleBounds, rule_bounds};
 use crate::explain::solve::best;
@@ -48,7 +47,7 @@ pub fn smallest_changes(
     hear("the best plan");
     let base = best(mission, limits)?;
     let bounds = mission.knowledge().map(rule_bounds).unwrap_or_default();
-    let unexamined = unexamined(&bounds);
+    let unexamined = bounds.unexamined_comparisons();
     let mut result = SmallestChanges { best: base, changes: Vec::new(), complete: false, unexamined };
     if !result.best.proved {
         return Ok(result);

@@ -44,7 +44,7 @@ const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 pub(super) struct Monitor {
     /// IRIs and local names of the quality attributes of the knowledge base.
     pub(super) attributes: BTreeSet<String>,
-    /// Those of `attributes` whose measured value cannot have an effect. Their measurements are refused.
+    /// Attributes whose measured value cannot have an effect. Their measurements are refused.
     pub(super) unused_attributes: BTreeSet<String>,
     checked: HashSet<String>,
     pub(super) filters: Filters,

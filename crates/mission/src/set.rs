@@ -159,7 +159,7 @@ impl Mission {
         }
         let mut words = name.split_whitespace();
         let symbol = Name::new(words.next()?);
-        let given = words.count();
+        let argument_count = words.count();
         let arity = |declared: &[Declaration]| {
             let mut declared = declared.iter().filter(|declared| self.is_settable(declared));
             declared
@@ -167,15 +167,15 @@ impl Mission {
                 .map(|declaration| declaration.parameters.len())
         };
         match (arity(&self.domain.functions), arity(&self.domain.predicates)) {
-            (_, Some(arity)) if arity == given => Some(format!(
+            (_, Some(arity)) if arity == argument_count => Some(format!(
                 "the value of `{name}` is `{value}`, but should be `true` or `false`, because `{name}` is a predicate \
                  with all its arguments"
             )),
             (Some(arity), _) => Some(format!(
-                "`{symbol}` is a numeric function; number of its arguments: {arity}, but `{name}` has {given}"
+                "`{symbol}` is a numeric function; number of its arguments: {arity}, but `{name}` has {argument_count}"
             )),
             (None, Some(arity)) => Some(format!(
-                "`{symbol}` is a predicate; number of its arguments: {arity}, but `{name}` has {given}; give all of \
+                "`{symbol}` is a predicate; number of its arguments: {arity}, but `{name}` has {argument_count}; give all of \
                  them and the value `true` or `false`, or all but the last and the last as the value"
             )),
             (None, None) => None,

@@ -46,13 +46,14 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     } else {
         by_graph(context, &bounds, first, most)
     };
-    let mut found = by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).unwrap_or(unknown);
+    let mut result =
+        by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).unwrap_or(unknown);
     // The evaluations of preferences are no steps of the plan.
     let actions = first.steps.len().saturating_sub(evaluations(task));
-    if let Some(forced) = &mut found.forced {
+    if let Some(forced) = &mut result.forced {
         forced.truncate(actions);
     }
-    Some(found)
+    Some(result)
 }
 
 /// Finds further cheapest plans as paths of a graph. Returns `None` if graph search is not applicable to the task.
