@@ -181,7 +181,8 @@ impl<'a> Session<'a> {
     /// Forwards a line to the recording and the web page. Returns the time of the line since the start of the mission.
     fn heard(&mut self, line: &Line) -> Duration {
         let now = self.begun + line.now.unwrap_or_else(|| self.clock.now());
-        let number = self.control.beliefs().lines() + 1;
+        self.blank_lines += line.blank_lines;
+        let number = self.number() + 1;
         self.line.store(number, Ordering::Relaxed);
         self.outlet.heard(number, now, &line.text);
         now
