@@ -24,7 +24,7 @@ pub(super) struct KeeperSession<'a> {
     begun: Duration,
     /// `true` if a line had a time. Time then advances with lines only.
     has_times: bool,
-    /// Number of blank lines so far, which the loop does not receive.
+    /// Number of blank lines that were read. The loop does not receive them.
     blank_lines: u64,
 }
 
