@@ -400,6 +400,7 @@ mod tests {
 
     fn check_all(seeds: std::ops::Range<u64>) {
         let (mut tasks, mut dead, mut useless) = (0, 0, 0);
+        let least = 10 * seeds.clone().count();
         for seed in seeds {
             let mut random = Generator(Random(seed));
             let texts = [(random.domain(), random.problem()), depot(seed)];
@@ -411,7 +412,7 @@ mod tests {
             }
         }
         assert!(
-            tasks > 1_000 && dead > 50 && useless > 50,
+            tasks > least && dead > 50 && useless > 50,
             "{tasks} tasks, {dead} with dead states, {useless} with useless operators"
         );
     }
