@@ -5,8 +5,8 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M101",
         "A file cannot be read.",
-        "It does not exist, is not a regular file, is too large, or the operating system refuses it.",
-        "Check the path; paths in a manifest are relative to the manifest.",
+        "It does not exist, is not a regular file, is too large, or the operating system refuses it. A manifest is not UTF-8.",
+        "Check the path; paths in a manifest are relative to the manifest. Convert a manifest to UTF-8.",
     ],
     [
         "M102",

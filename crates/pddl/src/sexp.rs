@@ -210,6 +210,16 @@ impl Reader<'_, '_> {
 
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn symbol(&mut self, span: Span, text: &str) {
+        // Different invalid bytes become the same character, so different names would become equal.
+        if text.contains(char::REPLACEMENT_CHARACTER) {
+            self.sink
+                .error(
+                    "P106",
+                    span,
+                    format!("`{text}` contains bytes that are not valid in the encoding of the file"),
+                )
+                .help("convert the file to UTF-8; other encodings are accepted only in comments");
+        }
         // A section keyword is the first item of a list directly below `(define`. At any other depth, a
         // parenthesis is superfluous or missing before the keyword.
         let is_first = self.open.last().is_some_and(|list| *list as usize + 1 == self.nodes.len());

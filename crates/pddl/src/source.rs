@@ -43,7 +43,7 @@ impl Source {
 
     /// Decodes the bytes of the file `name`: as UTF-16 if they begin with a UTF-16 byte order mark, else as
     /// UTF-8. Windows PowerShell's `>` writes UTF-16. Invalid sequences become U+FFFD, because comments of
-    /// older files are often Latin-1.
+    /// older files are often Latin-1. The parser accepts U+FFFD only in comments.
     pub fn from_bytes(name: impl Into<String>, bytes: &[u8]) -> Self {
         match bytes {
             [0xff, 0xfe, content @ ..] => Self::new(name, utf16(content, u16::from_le_bytes)),

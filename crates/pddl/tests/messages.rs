@@ -31,6 +31,23 @@ fn messages(right: &str, wrong: &str) -> String {
     text.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }
 
+/// Different bytes of a file in Latin-1 must not become equal names, but comments may have any encoding.
+#[test]
+fn names_in_another_encoding_are_refused() {
+    let messages = |problem: &[u8]| {
+        let (domain, problem) =
+            (Source::new("domain.pddl", DOMAIN), Source::from_bytes("problem.pddl", problem));
+        let diagnostics =
+            read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, diagnostics)| diagnostics);
+        render(&diagnostics, &[&domain, &problem], false)
+    };
+    assert_eq!(messages(&[b"; caf\xe9\n", PROBLEM.as_bytes()].concat()), "");
+    let latin_1 = PROBLEM.replace("a b - place", "a\u{e8} a\u{e9} - place").chars().map(|c| c as u8);
+    let text = messages(&latin_1.collect::<Vec<_>>());
+    assert!(text.starts_with("error[P106]"), "{text}");
+    assert!(text.contains("problem.pddl:3:13") && text.contains("convert the file to UTF-8"), "{text}");
+}
+
 macro_rules! says {
     ($name:ident, $right:literal => $wrong:literal, @$expected:literal) => {
         #[test]

@@ -21,8 +21,12 @@ pub(super) fn decoded(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     if encoding == encoding_rs::UTF_8 {
         return Ok(Cow::Borrowed(bytes));
     }
-    let text = encoding.decode_without_bom_handling(bytes).0.into_owned().into_bytes();
-    Ok(Cow::Owned(as_utf8(text)))
+    let (text, has_errors) = encoding.decode_without_bom_handling(bytes);
+    if has_errors {
+        // Different invalid bytes would become the same character, so different names would become equal.
+        return Err(format!("the text is not valid {}", encoding.name()));
+    }
+    Ok(Cow::Owned(as_utf8(text.into_owned().into_bytes())))
 }
 
 fn declared(text: &[u8]) -> Option<&[u8]> {
@@ -86,5 +90,7 @@ mod tests {
             decoded(b"<?xml version='1.0' encoding='klingon'?>")
                 .is_err_and(|message| message.contains("klingon"))
         );
+        let lone_surrogate = [0xff, 0xfe, b'a', 0, 0, 0xd8, b'b', 0];
+        assert!(decoded(&lone_surrogate).is_err_and(|message| message.contains("not valid UTF-16LE")));
     }
 }
