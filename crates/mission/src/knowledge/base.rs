@@ -9,7 +9,7 @@ use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::change::Status;
 use ontology::tomasys::{CalledNames, View};
-use ontology::vocab::local_name;
+use ontology::vocab::{local_name, tomasys};
 use ontology::{Annotation, EntityKind, Equality, Iri};
 use rules::{Delta, Engine, Fact, Literal, Program, Symbols};
 use tracing::info_span;
@@ -18,6 +18,7 @@ use crate::file::{discreet, quoted};
 use crate::knowledge::catalogue::Catalogue;
 use crate::knowledge::sources::{Sources, Stated};
 use crate::knowledge::statement::{Statement, Statements};
+use crate::knowledge::value_reads::{ValueRead, is_read, value_reads};
 use crate::knowledge::waiting::Waiting;
 use crate::message::{Errors, Message};
 use crate::planta::Terms;
@@ -30,6 +31,7 @@ const MANY_NAMES: usize = 32;
 pub struct Knowledge {
     pub(super) runtime: Runtime,
     pub(super) catalogue: OnceLock<Arc<Catalogue>>,
+    value_reads: OnceLock<Arc<[Vec<ValueRead>]>>,
     pub(super) waiting: Waiting,
     /// State of the documents as read and revised, without reports. Shares all unchanged data with `runtime`.
     origin: Runtime,
@@ -154,6 +156,7 @@ impl Knowledge {
         Self {
             runtime,
             catalogue,
+            value_reads: OnceLock::new(),
             waiting,
             origin,
             rule_count,
@@ -222,10 +225,10 @@ impl Knowledge {
         &self.runtime
     }
 
-    /// Returns the runtime for modification. Discards the cached designs, actions and measured
+    /// Returns the runtime for modification. Discards the cached designs, actions, measured values and reads of
     /// values.
     pub fn runtime_mut(&mut self) -> &mut Runtime {
-        self.catalogue = OnceLock::new();
+        (self.catalogue, self.value_reads) = (OnceLock::new(), OnceLock::new());
         &mut self.runtime
     }
 
@@ -233,6 +236,33 @@ impl Knowledge {
     /// on first use and cached.
     pub fn catalogue(&self) -> &Catalogue {
         self.catalogue.get_or_init(|| Arc::new(Catalogue::new(&self.view())))
+    }
+
+    /// Returns the reads of values by each rule and axiom, in the order of the program. The result is computed on first
+    /// use and cached.
+    pub fn value_reads(&self) -> &[Vec<ValueRead>] {
+        self.value_reads.get_or_init(|| value_reads(self.engine()))
+    }
+
+    /// Returns `true` if a measured value of the attribute can have an effect: the attribute has a measurement, a
+    /// design has a bound on it, it has a comparison operator, or a rule or an axiom can read its value. Also if the
+    /// domain is in PLANTA's form, which can refer to all values. The attribute is given by the IRI or local name of
+    /// its type. Axioms that only report contradictions do not count.
+    pub fn uses_measurement(&self, attribute: &str) -> bool {
+        let view = self.view();
+        let kinds = view.attribute_types();
+        let Some(kind) = kinds.iter().find(|kind| kind.iri == attribute || kind.name == attribute) else {
+            return false;
+        };
+        if self.terms().is_some() {
+            return true;
+        }
+        let catalogue = self.catalogue();
+        let mut requirements = catalogue.designs().iter().flat_map(|design| &design.requirements);
+        catalogue.measurements().iter().any(|measurement| measurement.attribute == kind.name)
+            || requirements.any(|bound| bound.attribute == kind.name)
+            || !view.values(&kind.iri, tomasys::QA_COMPARISON_OPERATOR).is_empty()
+            || is_read(self.engine(), self.value_reads(), &kind.iri)
     }
 
     pub(super) fn follow(&mut self, delta: &Delta) {
@@ -470,7 +500,8 @@ impl Knowledge {
                 .revise(change.delta.clone(), change.program.clone())
                 .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         }
-        (self.runtime, self.origin, self.catalogue) = (runtime, origin, OnceLock::new());
+        (self.runtime, self.origin) = (runtime, origin);
+        (self.catalogue, self.value_reads) = (OnceLock::new(), OnceLock::new());
         let ontology = change.stated.ontology();
         self.entities = ontology.entities.as_slice().into();
         self.annotations = ontology.annotations.as_slice().into();
