@@ -80,10 +80,9 @@ impl Mission {
         let mut words = name.split_whitespace();
         let symbol = words.next().map(Name::new);
         let arguments = words.count();
-        let declared = self.domain.functions.iter();
-        declared
-            .into_iter()
-            .any(|d| Some(&d.identifier.name) == symbol.as_ref() && d.parameters.len() == arguments)
+        let is_meant =
+            |d: &Declaration| Some(&d.identifier.name) == symbol.as_ref() && d.parameters.len() == arguments;
+        self.domain.functions.iter().any(is_meant)
     }
 
     /// Returns `true` if the problem states a fact, given without parentheses: `predicate
@@ -243,8 +242,8 @@ impl Mission {
         let problem_designs = self.own.iter().filter(|design| {
             self.problem.init.iter().any(|element| match element {
                 InitialElement::Fact(atom) => {
-                    let named: Vec<&Name> = atom.arguments.iter().map(Term::name).collect();
-                    named == [*design, &function] && self.bindings.solves().contains(&atom.predicate.name)
+                    self.bindings.solves().contains(&atom.predicate.name)
+                        && atom.arguments.iter().map(Term::name).eq([*design, &function])
                 }
                 _ => false,
             })

@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::change::Status;
-use ontology::tomasys::{CalledNames, View};
+use ontology::tomasys::{CalledNames, Individual, View};
 use ontology::vocab::{local_name, tomasys};
 use ontology::{Annotation, EntityKind, Equality, Iri};
 use rules::{Delta, Engine, Fact, Literal, Program, Symbols};
@@ -120,8 +120,7 @@ impl Knowledge {
         let engine = Engine::new(symbols, program, facts)
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let runtime = Runtime::new(engine, Mode::Retract);
-        let (sources, entities) = (Sources::default(), Arc::default());
-        Ok(Self::of(runtime, 0, Vec::new(), sources, entities))
+        Ok(Self::of(runtime, 0, Vec::new(), Sources::default(), Arc::default()))
     }
 
     /// Sets the translation of the ontology to PDDL, for a domain in PLANTA's form, and the asserted
@@ -151,21 +150,19 @@ impl Knowledge {
         sources: Sources,
         entities: Arc<[(EntityKind, Iri)]>,
     ) -> Self {
-        let (catalogue, waiting, origin) = (OnceLock::new(), Waiting::default(), runtime.clone());
-        let (documents, annotations) = (Arc::default(), Arc::default());
         Self {
+            origin: runtime.clone(),
             runtime,
-            catalogue,
+            catalogue: OnceLock::new(),
             value_reads: OnceLock::new(),
-            waiting,
-            origin,
+            waiting: Waiting::default(),
             rule_count,
             warnings,
             sources,
             called: Arc::default(),
             entities,
-            documents,
-            annotations,
+            documents: Arc::default(),
+            annotations: Arc::default(),
             terms: None,
             documented: Arc::default(),
             stated: None,
@@ -249,19 +246,13 @@ impl Knowledge {
     /// domain is in PLANTA's form, which can refer to all values. The attribute is given by the IRI or local name of
     /// its type. Axioms that only report contradictions do not count.
     pub fn uses_measurement(&self, attribute: &str) -> bool {
-        let view = self.view();
-        let kinds = view.attribute_types();
-        let Some(kind) = kinds.iter().find(|kind| kind.iri == attribute || kind.name == attribute) else {
-            return false;
-        };
-        if self.terms().is_some() {
-            return true;
-        }
+        let Some(kind) = self.attribute(attribute) else { return false };
         let catalogue = self.catalogue();
         let mut requirements = catalogue.designs().iter().flat_map(|design| &design.requirements);
-        catalogue.measurements().iter().any(|measurement| measurement.attribute == kind.name)
+        self.terms().is_some()
+            || catalogue.measurements().iter().any(|measurement| measurement.attribute == kind.name)
             || requirements.any(|bound| bound.attribute == kind.name)
-            || !view.values(&kind.iri, tomasys::QA_COMPARISON_OPERATOR).is_empty()
+            || !self.view().values(&kind.iri, tomasys::QA_COMPARISON_OPERATOR).is_empty()
             || is_read(self.engine(), self.value_reads(), &kind.iri)
     }
 
@@ -289,23 +280,20 @@ impl Knowledge {
     /// Returns the local name of a component, given by IRI, local name or object name. `None` if
     /// there is no such component.
     pub fn known_component(&self, name: &str) -> Option<String> {
-        let name = self.component(name);
-        let components = self.runtime.view().components().into_iter().map(|component| component.individual);
-        components
-            .into_iter()
-            .find(|component| component.name == name || component.iri == name)
-            .map(|component| component.name)
+        self.component_named(&self.component(name))
+    }
+
+    /// Like [`Knowledge::known_component`], but without object names.
+    fn component_named(&self, name: &str) -> Option<String> {
+        let mut components =
+            self.runtime.view().components().into_iter().map(|component| component.individual);
+        Some(components.find(|component| component.name == name || component.iri == name)?.name)
     }
 
     /// Resolves an object name to the IRI of its individual. Returns `name` itself if a component
     /// has this IRI or local name, or if no individual has this object name.
     pub(super) fn component(&self, name: &str) -> String {
-        let iri = self.called_so(name).filter(|_| {
-            let components = self.runtime.view().components();
-            !components
-                .iter()
-                .any(|component| component.individual.name == name || component.individual.iri == name)
-        });
+        let iri = self.called_so(name).filter(|_| self.component_named(name).is_none());
         iri.unwrap_or(name).to_owned()
     }
 
@@ -466,7 +454,11 @@ impl Knowledge {
 
     /// Returns `true` if an attribute type has this local name or IRI.
     pub fn has_attribute(&self, name: &str) -> bool {
-        self.view().attribute_types().iter().any(|attribute| attribute.name == name || attribute.iri == name)
+        self.attribute(name).is_some()
+    }
+
+    fn attribute(&self, name: &str) -> Option<Individual> {
+        self.view().attribute_types().into_iter().find(|kind| kind.name == name || kind.iri == name)
     }
 
     /// Inserts and deletes assertions.

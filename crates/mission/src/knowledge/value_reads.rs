@@ -30,16 +30,14 @@ impl ValueRead {
     pub fn can_be(&self, measurement: &Measurement, engine: &Engine) -> bool {
         let symbols = engine.symbols();
         let iri = measurement.individual.iri.as_str();
-        let is_possible = || match self.holder {
+        match self.holder {
+            _ if self.is_estimation => false,
             Term::Constant(symbol) => symbols.value(symbol).as_name() == Some(iri),
             Term::Variable(_) => symbols.find_name(iri).is_some_and(|individual| {
-                let has = |(property, kind): &(Symbol, Symbol)| {
-                    engine.holds(&Fact::new(*property, [individual, *kind]))
-                };
+                let has = |&(property, kind): &_| engine.holds(&Fact::new(property, [individual, kind]));
                 self.kinds.iter().all(has)
             }),
-        };
-        !self.is_estimation && is_possible()
+        }
     }
 
     /// Returns `true` if the individual can be a measurement of an attribute for which no design has a requirement, and
@@ -47,20 +45,25 @@ impl ValueRead {
     /// cannot.
     fn can_measure(&self, attribute: &str, symbols: &Symbols) -> bool {
         let is_attribute = |kind: Symbol| symbols.value(kind).as_name() == Some(attribute);
-        let is_possible = || match self.holder {
+        match self.holder {
+            _ if self.is_estimation => false,
             // The measurement that the first report creates.
             Term::Constant(symbol) => {
                 local(symbols, symbol).strip_prefix("obs_") == Some(local_name(attribute))
             }
             Term::Variable(_) => !self.is_bounded && self.kinds.iter().all(|(_, kind)| is_attribute(*kind)),
-        };
-        !self.is_estimation && is_possible()
+        }
     }
 }
 
 /// Returns the reads of each rule and axiom, in the order of the program.
 pub(super) fn value_reads(engine: &Engine) -> Arc<[Vec<ValueRead>]> {
-    engine.program().rules.iter().map(|rule| reads_of(engine.symbols(), rule)).collect()
+    let symbols = engine.symbols();
+    let reads = |rule: &Rule| -> Vec<ValueRead> {
+        let nested = rule.body.iter().flat_map(|atom| reads_in(symbols, atom.parts(), &rule.body));
+        reads_in(symbols, &rule.body, &[]).into_iter().chain(nested).collect()
+    };
+    engine.program().rules.iter().map(reads).collect()
 }
 
 /// Returns `true` if a rule or an axiom can read a measurement of an attribute for which no design has a requirement,
@@ -89,20 +92,14 @@ fn local(symbols: &Symbols, symbol: Symbol) -> &str {
     symbols.value(symbol).as_name().map_or("", local_name)
 }
 
-fn reads_of(symbols: &Symbols, rule: &Rule) -> Vec<ValueRead> {
-    let nested = rule.body.iter().flat_map(|atom| reads_in(symbols, atom.parts(), &rule.body));
-    reads_in(symbols, &rule.body, &[]).into_iter().chain(nested).collect()
-}
-
 /// Returns the reads of a conjunction, without those in its aggregates. The conditions in `context` hold in addition.
 fn reads_in(symbols: &Symbols, atoms: &[Atom], context: &[Atom]) -> Vec<ValueRead> {
-    let conditions = atoms.iter().chain(context).filter_map(|atom| match atom {
-        Atom::Relation { predicate, arguments } => {
-            Some((*predicate, local(symbols, *predicate), arguments.as_slice()))
+    let mut conditions: Vec<(Symbol, &str, &[Term])> = Vec::new();
+    for atom in atoms.iter().chain(context) {
+        if let Atom::Relation { predicate, arguments } = atom {
+            conditions.push((*predicate, local(symbols, *predicate), arguments.as_slice()));
         }
-        _ => None,
-    });
-    let conditions: Vec<(Symbol, &str, &[Term])> = conditions.collect();
+    }
     let links = |name: &str, to: Term| {
         conditions.iter().any(|(_, property, arguments)| *property == name && arguments.get(1) == Some(&to))
     };
