@@ -120,7 +120,7 @@ fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alterat
 /// other designs are tried only if the alterations that concern this design do not suffice.
 fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Ways {
     let bounds = rule_bounds(knowledge);
-    let mut unexamined = bounds.unexamined_comparisons();
+    let mut unexamined = bounds.unexamined.clone();
     let candidates = candidates(knowledge, design, &bounds);
     let (sets, _) = repairs(knowledge, design, &candidates);
     if !sets.is_empty() {
@@ -153,7 +153,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         let bounds = rule_bounds(knowledge);
         let candidates = candidates(knowledge, design, &bounds).into_iter();
         availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
-        availability.unexamined = bounds.unexamined_comparisons();
+        availability.unexamined = bounds.unexamined;
         return availability;
     }
     let Ways { sets, unexamined } = ways(knowledge, design);
@@ -280,8 +280,8 @@ fn altered<'a>(
 }
 
 fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
-    let designs = knowledge.view().function_designs();
-    designs.iter().any(|candidate| candidate.individual == design.individual && candidate.available)
+    let mut designs = knowledge.catalogue().designs().iter();
+    designs.any(|candidate| candidate.individual == design.individual && candidate.available)
 }
 
 /// Computes the best plan after alterations of the situation. At a limit, returns the best plan
@@ -346,7 +346,7 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign, rules: &RuleBounds
         }
     }
     let bounds = rules.bounds.iter().filter(|bound| bound.concerns(&design.individual.iri));
-    for bound in bounds.filter(|bound| design.available || bound.can_help()) {
+    for bound in bounds.filter(|bound| design.available || !bound.is_harmful) {
         if !alterations.contains(&bound.alteration) {
             alterations.push(bound.alteration.clone());
         }
@@ -361,9 +361,9 @@ fn all_candidates(
     mut candidates_found: Vec<Alteration>,
     rules: &RuleBounds,
 ) -> Vec<Alteration> {
-    let designs = knowledge.view().function_designs();
-    let additional = designs.iter().flat_map(|design| candidates(knowledge, design, rules));
-    let bounds = rules.bounds.iter().filter(|bound| bound.is_deciding());
+    let additional =
+        knowledge.catalogue().designs().iter().flat_map(|design| candidates(knowledge, design, rules));
+    let bounds = rules.bounds.iter().filter(|bound| bound.is_deciding);
     let additional = additional.chain(bounds.map(|bound| bound.alteration.clone()));
     for alteration in components(knowledge, false, &|_| true).into_iter().chain(additional) {
         if alteration.to != Target::Failed && !candidates_found.contains(&alteration) {

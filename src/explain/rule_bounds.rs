@@ -23,8 +23,8 @@ const AVAILABILITY: &[&str] = &["fd_realisability", "fd_available"];
 pub(super) struct RuleBounds {
     /// Comparisons of measured values with numbers.
     pub bounds: Vec<RuleBound>,
-    /// Names of the rules that can affect the availability of designs and have comparisons that are not in `bounds`.
-    pub unexamined: BTreeSet<String>,
+    /// Rules that can affect the availability of designs and have comparisons that are not in `bounds`, in words.
+    pub unexamined: Vec<String>,
 }
 
 /// An alteration of a measured value that changes the outcome of a comparison in a rule.
@@ -32,37 +32,17 @@ pub(super) struct RuleBounds {
 pub(super) struct RuleBound {
     pub alteration: Alteration,
     /// `true` if the conclusion of the rule can affect the availability of designs.
-    is_deciding: bool,
+    pub is_deciding: bool,
     /// IRIs of the designs about which the rule concludes; `None` if it may conclude about any design.
     designs: Option<BTreeSet<String>>,
     /// `true` if the rule itself rules designs out, and the alteration only satisfies the comparison.
-    is_harmful: bool,
+    pub is_harmful: bool,
 }
 
 impl RuleBound {
     /// Returns `true` if the rule can affect the availability of a design.
     pub fn concerns(&self, iri: &str) -> bool {
         self.is_deciding && self.designs.as_ref().is_none_or(|designs| designs.contains(iri))
-    }
-
-    /// Returns `true` unless the alteration can only rule out designs about which the rule concludes.
-    pub fn can_help(&self) -> bool {
-        !self.is_harmful
-    }
-
-    /// Returns `true` if the rule can affect the availability of any design.
-    pub fn is_deciding(&self) -> bool {
-        self.is_deciding
-    }
-}
-
-impl RuleBounds {
-    /// Describes the comparisons that are not among the bounds.
-    pub fn unexamined_comparisons(&self) -> Vec<String> {
-        self.unexamined
-            .iter()
-            .map(|rule| format!("comparisons of measurements in the rule `{rule}`"))
-            .collect()
     }
 }
 
@@ -75,17 +55,18 @@ pub(super) fn rule_bounds(knowledge: &Knowledge) -> RuleBounds {
     let reader = Reader { engine, rules };
     let deciding = reader.deciding();
     let carriers = reader.carriers();
-    let mut result = RuleBounds::default();
+    let (mut bounds, mut unexamined) = (Vec::new(), BTreeSet::new());
     for reads in &reader.rules {
         let rule = reads.rule;
         let is_deciding = concluded(rule).any(|predicate| deciding.contains(&predicate));
-        let is_examined = reader.read(reads, &carriers, is_deciding, &mut result.bounds);
+        let is_examined = reader.read(reads, &carriers, is_deciding, &mut bounds);
         if is_deciding && !is_examined {
             let label = rule.identity.label.as_ref().map(ToString::to_string);
-            result.unexamined.insert(label.unwrap_or_else(|| rule.identity.to_string()));
+            unexamined.insert(label.unwrap_or_else(|| rule.identity.to_string()));
         }
     }
-    result
+    let words = |rule: &String| format!("comparisons of measurements in the rule `{rule}`");
+    RuleBounds { bounds, unexamined: unexamined.iter().map(words).collect() }
 }
 
 /// A rule with its reads of measured values.
