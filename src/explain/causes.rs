@@ -11,7 +11,7 @@
 //! \[1\] R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
 
 use num_rational::BigRational;
-use ontology::tomasys::change::Status as Component;
+use ontology::tomasys::change::{Status as Component, is_failed};
 use ontology::tomasys::{FunctionDesign, Requirement};
 use planner::Limits;
 use std::cell::Cell;
@@ -378,8 +378,8 @@ fn all_candidates(
 fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
     let components = knowledge.view().components().into_iter();
     let components = components.filter(|component| is_own(&component.individual.iri));
-    let has_failed = |status: Option<&str>| matches!(status, Some("FALSE" | "ERROR" | "false"));
-    let components = components.filter(|component| has_failed(component.status.as_deref()) != working);
+    let components =
+        components.filter(|component| component.status.as_deref().is_some_and(is_failed) != working);
     let to = if working { Target::Failed } else { Target::Recovered };
     components
         .map(|component| Alteration { name: component.individual.name, from: None, to: to.clone() })
