@@ -445,9 +445,7 @@ impl Facts {
 }
 
 fn words(atom: &Atom) -> (String, Vec<String>) {
-    let argument = |term: &Term| match term {
-        Term::Variable(name) | Term::Constant(name) => name.name.as_str().to_owned(),
-    };
+    let argument = |term: &Term| term.name().to_string();
     (atom.predicate.name.as_str().to_ascii_lowercase(), atom.arguments.iter().map(argument).collect())
 }
 

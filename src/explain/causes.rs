@@ -11,7 +11,7 @@
 //! \[1\] R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
 
 use num_rational::BigRational;
-use ontology::tomasys::change::Status as Component;
+use ontology::tomasys::change::{Status as Component, is_failed};
 use ontology::tomasys::{FunctionDesign, Requirement};
 use planner::Limits;
 use std::cell::Cell;
@@ -120,7 +120,7 @@ fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alterat
 /// other designs are tried only if the alterations that concern this design do not suffice.
 fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Ways {
     let bounds = rule_bounds(knowledge);
-    let mut unexamined = bounds.unexamined_comparisons();
+    let mut unexamined = bounds.unexamined.clone();
     let candidates = candidates(knowledge, design, &bounds);
     let (sets, _) = repairs(knowledge, design, &candidates);
     if !sets.is_empty() {
@@ -153,7 +153,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         let bounds = rule_bounds(knowledge);
         let candidates = candidates(knowledge, design, &bounds).into_iter();
         availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
-        availability.unexamined = bounds.unexamined_comparisons();
+        availability.unexamined = bounds.unexamined;
         return availability;
     }
     let Ways { sets, unexamined } = ways(knowledge, design);
@@ -280,8 +280,8 @@ fn altered<'a>(
 }
 
 fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
-    let designs = knowledge.view().function_designs();
-    designs.iter().any(|candidate| candidate.individual == design.individual && candidate.available)
+    let mut designs = knowledge.catalogue().designs().iter();
+    designs.any(|candidate| candidate.individual == design.individual && candidate.available)
 }
 
 /// Computes the best plan after alterations of the situation. At a limit, returns the best plan
@@ -346,7 +346,7 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign, rules: &RuleBounds
         }
     }
     let bounds = rules.bounds.iter().filter(|bound| bound.concerns(&design.individual.iri));
-    for bound in bounds.filter(|bound| design.available || bound.can_help()) {
+    for bound in bounds.filter(|bound| design.available || !bound.is_harmful) {
         if !alterations.contains(&bound.alteration) {
             alterations.push(bound.alteration.clone());
         }
@@ -361,9 +361,9 @@ fn all_candidates(
     mut candidates_found: Vec<Alteration>,
     rules: &RuleBounds,
 ) -> Vec<Alteration> {
-    let designs = knowledge.view().function_designs();
-    let additional = designs.iter().flat_map(|design| candidates(knowledge, design, rules));
-    let bounds = rules.bounds.iter().filter(|bound| bound.is_deciding());
+    let additional =
+        knowledge.catalogue().designs().iter().flat_map(|design| candidates(knowledge, design, rules));
+    let bounds = rules.bounds.iter().filter(|bound| bound.is_deciding);
     let additional = additional.chain(bounds.map(|bound| bound.alteration.clone()));
     for alteration in components(knowledge, false, &|_| true).into_iter().chain(additional) {
         if alteration.to != Target::Failed && !candidates_found.contains(&alteration) {
@@ -378,8 +378,8 @@ fn all_candidates(
 fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
     let components = knowledge.view().components().into_iter();
     let components = components.filter(|component| is_own(&component.individual.iri));
-    let has_failed = |status: Option<&str>| matches!(status, Some("FALSE" | "ERROR" | "false"));
-    let components = components.filter(|component| has_failed(component.status.as_deref()) != working);
+    let components =
+        components.filter(|component| component.status.as_deref().is_some_and(is_failed) != working);
     let to = if working { Target::Failed } else { Target::Recovered };
     components
         .map(|component| Alteration { name: component.individual.name, from: None, to: to.clone() })

@@ -62,15 +62,14 @@ pub struct DesignExplanation {
 ///
 /// # Errors
 /// M112 if the design does not exist.
-fn find(mission: &Mission, name: &str) -> Result<(FunctionDesign, Vec<FunctionDesign>), Errors> {
-    let designs =
-        mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
+fn find<'m>(mission: &'m Mission, name: &str) -> Result<(&'m FunctionDesign, &'m [FunctionDesign]), Errors> {
+    let designs = mission.knowledge().map(|knowledge| knowledge.catalogue().designs()).unwrap_or_default();
     let named = designs.iter().find(|design| design.individual.name == name);
     let is_meant = |design: &&FunctionDesign| {
         [local_name(&design.individual.iri), &design.individual.iri].contains(&name)
     };
     if let Some(found) = named.or_else(|| designs.iter().find(is_meant)) {
-        return Ok((found.clone(), designs));
+        return Ok((found, designs));
     }
     let names: Vec<&str> = designs.iter().map(|design| design.individual.name.as_str()).collect();
     let suggestion = crate::message::did_you_mean(name, names.iter().map(|name| &**name));
@@ -85,7 +84,7 @@ fn find(mission: &Mission, name: &str) -> Result<(FunctionDesign, Vec<FunctionDe
 /// M112 if the design does not exist.
 pub fn availability(mission: &Mission, name: &str) -> Result<Availability, Errors> {
     let (found, _) = find(mission, name)?;
-    Ok(causes::availability(mission, &found))
+    Ok(causes::availability(mission, found))
 }
 
 /// Explains availability and choice of the design with this local name or IRI. At a limit, returns

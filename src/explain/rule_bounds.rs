@@ -10,14 +10,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use num_rational::BigRational;
 use ontology::tomasys::Measurement;
 use ontology::vocab::local_name;
-use rules::{Atom, BuiltIn, Engine, Fact, Rule, Symbol, Term, Variable};
+use rules::{Atom, BuiltIn, Engine, Rule, Symbol, Term, Variable};
 
 use crate::explain::parts::{Alteration, Target};
-use crate::knowledge::Knowledge;
+use crate::knowledge::{Knowledge, VALUE_PROPERTIES, ValueRead};
 
-const VALUE: &[&str] = &["hasValue", "qa_has_value"];
-const TYPE: &[&str] = &["isQAtype"];
-const ESTIMATION: &[&str] = &["hasQAestimation"];
 const BOUND: &[&str] = &["hasMinimum", "hasMaximum"];
 const AVAILABILITY: &[&str] = &["fd_realisability", "fd_available"];
 
@@ -26,8 +23,8 @@ const AVAILABILITY: &[&str] = &["fd_realisability", "fd_available"];
 pub(super) struct RuleBounds {
     /// Comparisons of measured values with numbers.
     pub bounds: Vec<RuleBound>,
-    /// Names of the rules that can affect the availability of designs and have comparisons that are not in `bounds`.
-    pub unexamined: BTreeSet<String>,
+    /// Rules that can affect the availability of designs and have comparisons that are not in `bounds`, in words.
+    pub unexamined: Vec<String>,
 }
 
 /// An alteration of a measured value that changes the outcome of a comparison in a rule.
@@ -35,11 +32,11 @@ pub(super) struct RuleBounds {
 pub(super) struct RuleBound {
     pub alteration: Alteration,
     /// `true` if the conclusion of the rule can affect the availability of designs.
-    is_deciding: bool,
+    pub is_deciding: bool,
     /// IRIs of the designs about which the rule concludes; `None` if it may conclude about any design.
     designs: Option<BTreeSet<String>>,
     /// `true` if the rule itself rules designs out, and the alteration only satisfies the comparison.
-    is_harmful: bool,
+    pub is_harmful: bool,
 }
 
 impl RuleBound {
@@ -47,66 +44,64 @@ impl RuleBound {
     pub fn concerns(&self, iri: &str) -> bool {
         self.is_deciding && self.designs.as_ref().is_none_or(|designs| designs.contains(iri))
     }
-
-    /// Returns `true` unless the alteration can only rule out designs about which the rule concludes.
-    pub fn can_help(&self) -> bool {
-        !self.is_harmful
-    }
-
-    /// Returns `true` if the rule can affect the availability of any design.
-    pub fn is_deciding(&self) -> bool {
-        self.is_deciding
-    }
-}
-
-impl RuleBounds {
-    /// Describes the comparisons that are not among the bounds.
-    pub fn unexamined_comparisons(&self) -> Vec<String> {
-        self.unexamined
-            .iter()
-            .map(|rule| format!("comparisons of measurements in the rule `{rule}`"))
-            .collect()
-    }
 }
 
 /// Returns the bounds with which the rules of a knowledge base compare measured values.
 pub(super) fn rule_bounds(knowledge: &Knowledge) -> RuleBounds {
     let measurements = knowledge.view().measurements();
-    let reader = Reader { engine: knowledge.engine(), measurements: &measurements };
+    let engine = knowledge.engine();
+    let rules = engine.program().rules.iter().zip(knowledge.value_reads());
+    let rules = rules.map(|(rule, reads)| RuleReads::new(engine, &measurements, rule, reads)).collect();
+    let reader = Reader { engine, rules };
     let deciding = reader.deciding();
     let carriers = reader.carriers();
-    let mut result = RuleBounds::default();
-    for rule in &reader.engine.program().rules {
+    let (mut bounds, mut unexamined) = (Vec::new(), BTreeSet::new());
+    for reads in &reader.rules {
+        let rule = reads.rule;
         let is_deciding = concluded(rule).any(|predicate| deciding.contains(&predicate));
-        let is_examined = reader.read(rule, &carriers, is_deciding, &mut result.bounds);
+        let is_examined = reader.read(reads, &carriers, is_deciding, &mut bounds);
         if is_deciding && !is_examined {
             let label = rule.identity.label.as_ref().map(ToString::to_string);
-            result.unexamined.insert(label.unwrap_or_else(|| rule.identity.to_string()));
+            unexamined.insert(label.unwrap_or_else(|| rule.identity.to_string()));
         }
     }
-    result
+    let words = |rule: &String| format!("comparisons of measurements in the rule `{rule}`");
+    RuleBounds { bounds, unexamined: unexamined.iter().map(words).collect() }
 }
 
-/// Variables of a rule whose values depend on measured values.
-struct Values<'a> {
+/// A rule with its reads of measured values.
+struct RuleReads<'a> {
+    rule: &'a Rule,
+    reads: &'a [ValueRead],
     /// Variables whose values are measured values, with the possible measurements.
-    direct: BTreeMap<Variable, Vec<&'a Measurement>>,
-    /// All variables whose values depend on measured values.
-    dependent: BTreeSet<Variable>,
+    measured: BTreeMap<Variable, Vec<&'a Measurement>>,
+    /// `true` if a condition requires that a measured value is a constant.
+    has_constant: bool,
 }
 
-impl Values<'_> {
-    fn contain(&self, term: Term) -> bool {
-        term.as_variable().is_some_and(|variable| self.dependent.contains(&variable))
+impl<'a> RuleReads<'a> {
+    fn new(engine: &Engine, measurements: &'a [Measurement], rule: &'a Rule, reads: &'a [ValueRead]) -> Self {
+        let mut result = Self { rule, reads, measured: BTreeMap::new(), has_constant: false };
+        for read in reads {
+            let Some(value) = read.value else { continue };
+            let possible = measurements.iter().filter(|measurement| read.can_be(measurement, engine));
+            let possible: Vec<&Measurement> = possible.collect();
+            match value {
+                _ if possible.is_empty() => {}
+                Term::Variable(variable) => drop(result.measured.insert(variable, possible)),
+                Term::Constant(_) => result.has_constant = true,
+            }
+        }
+        result
     }
 }
 
 struct Reader<'a> {
     engine: &'a Engine,
-    measurements: &'a [Measurement],
+    rules: Vec<RuleReads<'a>>,
 }
 
-impl<'a> Reader<'a> {
+impl Reader<'_> {
     fn is_named(&self, predicate: Symbol, names: &[&str]) -> bool {
         let iri = self.engine.symbols().value(predicate).as_name();
         iri.is_some_and(|iri| names.contains(&local_name(iri)))
@@ -122,7 +117,7 @@ impl<'a> Reader<'a> {
             let before = deciding.len();
             for rule in rules {
                 if concluded(rule).any(|predicate| deciding.contains(&predicate)) {
-                    deciding.extend(atoms(rule).into_iter().filter_map(predicate_of));
+                    deciding.extend(atoms(rule).filter_map(predicate_of));
                 }
             }
             if deciding.len() == before {
@@ -136,10 +131,9 @@ impl<'a> Reader<'a> {
         let mut carriers = BTreeSet::new();
         loop {
             let before = carriers.len();
-            for rule in &self.engine.program().rules {
-                let values = self.values(rule, &carriers);
-                let heads =
-                    rule.head.iter().filter(|atom| atom.terms().iter().any(|term| values.contain(*term)));
+            for reads in &self.rules {
+                let dependent = self.dependent(reads, &carriers);
+                let heads = reads.rule.head.iter().filter(|atom| contain(&dependent, &atom.terms()));
                 carriers.extend(heads.filter_map(predicate_of));
             }
             if carriers.len() == before {
@@ -148,25 +142,20 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn values(&self, rule: &Rule, carriers: &BTreeSet<Symbol>) -> Values<'a> {
-        let mut values = Values { direct: BTreeMap::new(), dependent: BTreeSet::new() };
-        for atom in atoms(rule) {
-            let Atom::Relation { predicate, arguments } = atom else { continue };
-            if self.is_named(*predicate, VALUE) {
-                if let [holder, Term::Variable(value)] = arguments[..] {
-                    let measurements = self.measurements_of(rule, holder);
-                    if !measurements.is_empty() {
-                        values.direct.insert(value, measurements);
-                        values.dependent.insert(value);
-                    }
-                }
-            } else if carriers.contains(predicate) {
-                values.dependent.extend(arguments.iter().filter_map(|term| term.as_variable()));
+    /// Returns the variables of a rule whose values depend on measured values.
+    fn dependent(&self, reads: &RuleReads<'_>, carriers: &BTreeSet<Symbol>) -> BTreeSet<Variable> {
+        let mut dependent: BTreeSet<Variable> = reads.measured.keys().copied().collect();
+        for atom in atoms(reads.rule) {
+            if let Atom::Relation { predicate, arguments } = atom
+                && carriers.contains(predicate)
+                && !self.is_named(*predicate, &VALUE_PROPERTIES)
+            {
+                dependent.extend(arguments.iter().filter_map(|term| term.as_variable()));
             }
         }
         loop {
-            let before = values.dependent.len();
-            for atom in atoms(rule) {
+            let before = dependent.len();
+            for atom in atoms(reads.rule) {
                 let terms: Vec<Term> = match atom {
                     Atom::BuiltIn { built_in, arguments } if !is_comparison(*built_in) => arguments.clone(),
                     Atom::Aggregate { aggregate, result, .. } => {
@@ -174,66 +163,26 @@ impl<'a> Reader<'a> {
                     }
                     _ => continue,
                 };
-                if terms.iter().any(|term| values.contain(*term)) {
-                    values.dependent.extend(terms.iter().filter_map(|term| term.as_variable()));
+                if contain(&dependent, &terms) {
+                    dependent.extend(terms.iter().filter_map(|term| term.as_variable()));
                 }
             }
-            if values.dependent.len() == before {
-                return values;
+            if dependent.len() == before {
+                return dependent;
             }
         }
-    }
-
-    /// Returns `true` if a rule requires that a term is an estimation of a design.
-    fn is_estimation(&self, rule: &Rule, term: Term) -> bool {
-        rule.body.iter().any(|atom| match atom {
-            Atom::Relation { predicate, arguments } => {
-                self.is_named(*predicate, ESTIMATION) && arguments.get(1) == Some(&term)
-            }
-            _ => false,
-        })
-    }
-
-    /// Returns the measurements whose individual a term of a rule can denote.
-    fn measurements_of(&self, rule: &Rule, holder: Term) -> Vec<&'a Measurement> {
-        if self.is_estimation(rule, holder) {
-            return Vec::new();
-        }
-        let symbols = self.engine.symbols();
-        let mut types: Vec<(Symbol, Symbol)> = Vec::new();
-        for atom in atoms(rule) {
-            if let Atom::Relation { predicate, arguments } = atom
-                && let [subject, Term::Constant(kind)] = arguments[..]
-                && subject == holder
-                && self.is_named(*predicate, TYPE)
-            {
-                types.push((*predicate, kind));
-            }
-        }
-        let is_possible = |measurement: &&Measurement| {
-            let iri = measurement.individual.iri.as_str();
-            match holder {
-                Term::Constant(symbol) => symbols.value(symbol).as_name() == Some(iri),
-                Term::Variable(_) => symbols.find_name(iri).is_some_and(|individual| {
-                    let has = |(predicate, kind): &(Symbol, Symbol)| {
-                        self.engine.holds(&Fact::new(*predicate, [individual, *kind]))
-                    };
-                    types.iter().all(has)
-                }),
-            }
-        };
-        self.measurements.iter().filter(is_possible).collect()
     }
 
     /// Adds the bounds of a rule to `bounds`. Returns `false` if the rule depends on measured values in another way.
     fn read(
         &self,
-        rule: &Rule,
+        reads: &RuleReads<'_>,
         carriers: &BTreeSet<Symbol>,
         is_deciding: bool,
         bounds: &mut Vec<RuleBound>,
     ) -> bool {
-        let values = self.values(rule, carriers);
+        let rule = reads.rule;
+        let dependent = self.dependent(reads, carriers);
         let designs = self.designs(rule);
         // With an aggregate, a comparison that is not satisfied may rule a design out.
         let is_direct = !rule.head.is_empty()
@@ -242,17 +191,26 @@ impl<'a> Reader<'a> {
                 .iter()
                 .all(|atom| predicate_of(atom).is_some_and(|name| self.is_named(name, AVAILABILITY)))
             && !rule.body.iter().any(|atom| matches!(atom, Atom::Aggregate { .. }));
-        let mut is_examined = true;
+        let mut is_examined = !reads.has_constant;
         for atom in atoms(rule) {
-            let Atom::BuiltIn { built_in, arguments } = atom else {
-                is_examined &= self.is_independent(rule, atom, &values, carriers);
-                continue;
+            let (built_in, arguments) = match atom {
+                Atom::BuiltIn { built_in, arguments } => (*built_in, arguments),
+                Atom::Not { predicate, .. } => {
+                    is_examined &=
+                        !carriers.contains(predicate) && !self.is_named(*predicate, &VALUE_PROPERTIES);
+                    continue;
+                }
+                Atom::Aggregate { aggregate, .. } => {
+                    is_examined &= !aggregate.value().is_some_and(|term| contain(&dependent, &[term]));
+                    continue;
+                }
+                _ => continue,
             };
             let is_range = matches!(built_in, BuiltIn::DataRange | BuiltIn::OutsideDataRange);
-            if is_range || !arguments.iter().any(|term| values.contain(*term)) {
+            if is_range || !contain(&dependent, arguments) {
                 continue;
             }
-            let Some(changes) = self.changes(rule, *built_in, arguments, &values) else {
+            let Some(changes) = self.changes(reads, built_in, arguments, &dependent) else {
                 is_examined = false;
                 continue;
             };
@@ -264,31 +222,10 @@ impl<'a> Reader<'a> {
             }));
         }
         let concludes_value = rule.head.iter().any(|atom| {
-            predicate_of(atom).is_some_and(|name| self.is_named(name, VALUE))
-                && atom.terms().iter().any(|term| values.contain(*term))
+            predicate_of(atom).is_some_and(|name| self.is_named(name, &VALUE_PROPERTIES))
+                && contain(&dependent, &atom.terms())
         });
         is_examined && !concludes_value
-    }
-
-    /// Returns `true` unless an atom that is not a built-in tests or aggregates measured values.
-    fn is_independent(
-        &self,
-        rule: &Rule,
-        atom: &Atom,
-        values: &Values<'_>,
-        carriers: &BTreeSet<Symbol>,
-    ) -> bool {
-        match atom {
-            Atom::Relation { predicate, arguments } => match arguments[..] {
-                [holder, Term::Constant(_)] if self.is_named(*predicate, VALUE) => {
-                    self.measurements_of(rule, holder).is_empty()
-                }
-                _ => true,
-            },
-            Atom::Not { predicate, .. } => !carriers.contains(predicate) && !self.is_named(*predicate, VALUE),
-            Atom::Aggregate { aggregate, .. } => !aggregate.value().is_some_and(|term| values.contain(term)),
-            _ => true,
-        }
     }
 
     /// Returns the IRIs of the designs whose availability a rule concludes, if it concludes nothing else and names
@@ -308,17 +245,17 @@ impl<'a> Reader<'a> {
     /// now. Returns `None` if they are not known.
     fn changes(
         &self,
-        rule: &Rule,
+        reads: &RuleReads<'_>,
         built_in: BuiltIn,
         arguments: &[Term],
-        values: &Values<'_>,
+        dependent: &BTreeSet<Variable>,
     ) -> Option<Vec<(Alteration, bool)>> {
         if !is_comparison(built_in) {
             return None;
         }
-        let direct = |term: Term| values.direct.get(&term.as_variable()?);
+        let measured = |term: Term| reads.measured.get(&term.as_variable()?);
         let (measurements, other, is_swapped) = match *arguments {
-            [left, right] => match (direct(left), direct(right)) {
+            [left, right] => match (measured(left), measured(right)) {
                 (Some(measurements), None) => (measurements, right, false),
                 (None, Some(measurements)) => (measurements, left, true),
                 _ => return None,
@@ -328,7 +265,7 @@ impl<'a> Reader<'a> {
         let bound = match other {
             Term::Constant(symbol) => self.engine.symbols().value(symbol).as_literal()?.as_rational()?,
             Term::Variable(_) => {
-                let is_static = !values.contain(other) && self.is_value_of_design(rule, other);
+                let is_static = !contain(dependent, &[other]) && self.is_value_of_design(reads, other);
                 return is_static.then(Vec::new);
             }
         };
@@ -345,23 +282,26 @@ impl<'a> Reader<'a> {
     }
 
     /// Returns `true` if a variable is bound by a bound or an estimation of a design.
-    fn is_value_of_design(&self, rule: &Rule, variable: Term) -> bool {
-        rule.body.iter().any(|atom| match atom {
-            Atom::Relation { predicate, arguments } => match arguments[..] {
-                [holder, value] if value == variable => {
-                    self.is_named(*predicate, BOUND)
-                        || self.is_named(*predicate, VALUE) && self.is_estimation(rule, holder)
-                }
-                _ => false,
-            },
+    fn is_value_of_design(&self, reads: &RuleReads<'_>, variable: Term) -> bool {
+        let is_bound = |atom: &Atom| match atom {
+            Atom::Relation { predicate, arguments } => {
+                self.is_named(*predicate, BOUND) && arguments.get(1) == Some(&variable)
+            }
             _ => false,
-        })
+        };
+        reads.reads.iter().any(|read| read.is_estimation && read.value == Some(variable))
+            || reads.rule.body.iter().any(is_bound)
     }
 }
 
+/// Returns `true` if one of the terms is one of the variables.
+fn contain(variables: &BTreeSet<Variable>, terms: &[Term]) -> bool {
+    terms.iter().any(|term| term.as_variable().is_some_and(|variable| variables.contains(&variable)))
+}
+
 /// Returns the atoms in the body of a rule, and those in its aggregates.
-fn atoms(rule: &Rule) -> Vec<&Atom> {
-    rule.body.iter().flat_map(|atom| std::iter::once(atom).chain(atom.parts())).collect()
+fn atoms(rule: &Rule) -> impl Iterator<Item = &Atom> {
+    rule.body.iter().flat_map(|atom| std::iter::once(atom).chain(atom.parts()))
 }
 
 fn predicate_of(atom: &Atom) -> Option<Symbol> {

@@ -47,7 +47,7 @@ pub fn smallest_changes(
     hear("the best plan");
     let base = best(mission, limits)?;
     let bounds = mission.knowledge().map(rule_bounds).unwrap_or_default();
-    let unexamined = bounds.unexamined_comparisons();
+    let unexamined = bounds.unexamined.clone();
     let mut result = SmallestChanges { best: base, changes: Vec::new(), complete: false, unexamined };
     if !result.best.proved {
         return Ok(result);
@@ -251,9 +251,8 @@ fn shortest_decimal(low: &BigRational, high: &BigRational) -> BigRational {
 /// Returns the values of an attribute, above or below `from`, at which a requirement of a design
 /// begins or ceases to hold.
 fn required(mission: &Mission, attribute: &str, from: &BigRational, upwards: bool) -> Vec<Target> {
-    let designs =
-        mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
-    let requirements = designs.iter().flat_map(|design| &design.requirements);
+    let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
+    let requirements = designs.flat_map(|design| &design.requirements);
     let mut targets: Vec<Target> = Vec::new();
     for requirement in requirements.filter(|requirement| requirement.attribute == attribute) {
         if let Some(minimum) = &requirement.minimum {

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use pddl::ast::{Atom, InitialElement, Name, Term};
+use pddl::ast::{Atom, InitialElement, Term};
 use serde_json::{Value, json};
 
 use crate::mapek::control::Loop;
@@ -85,15 +85,9 @@ fn have_equal_records(left: &InitialElement, right: &InitialElement) -> bool {
 }
 
 fn have_equal_words(left: &Atom, right: &Atom) -> bool {
-    fn word(term: &Term) -> &Name {
-        match term {
-            Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
-        }
+    fn word(term: &Term) -> &str {
+        term.name().as_str()
     }
     left.predicate.name.as_str() == right.predicate.name.as_str()
-        && left.arguments.iter().map(word).map(Name::as_str).eq(right
-            .arguments
-            .iter()
-            .map(word)
-            .map(Name::as_str))
+        && left.arguments.iter().map(word).eq(right.arguments.iter().map(word))
 }

@@ -467,11 +467,7 @@ fn as_numbers<S: Serializer>(values: &[(String, BigRational)], serializer: S) ->
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 fn as_word<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(match status {
-        Status::Failed => "FALSE",
-        Status::Recovered => "RECOVERED",
-        Status::Working => "TRUE",
-    })
+    serializer.serialize_str(status.word())
 }
 
 impl Event {

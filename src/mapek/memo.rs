@@ -99,9 +99,6 @@ fn are_equal(left: &InitialElement, right: &InitialElement) -> bool {
 }
 
 fn are_equal_atoms(left: &Atom, right: &Atom) -> bool {
-    let name = |term: &Term| match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.clone(),
-    };
     left.predicate.name == right.predicate.name
-        && left.arguments.iter().map(name).eq(right.arguments.iter().map(name))
+        && left.arguments.iter().map(Term::name).eq(right.arguments.iter().map(Term::name))
 }

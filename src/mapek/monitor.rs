@@ -8,7 +8,7 @@ use ontology::vocab::local_name;
 use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
-use crate::knowledge::RobotReport;
+use crate::knowledge::{RobotReport, VALUE_PROPERTIES};
 use crate::mapek::acknowledge::{Failure, Receipt};
 use crate::mapek::answer::{Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running};
@@ -36,9 +36,6 @@ const PLANNED: [&str; 9] = [
     "inContext",
     "FunctionDesign",
 ];
-
-/// Local names of the properties that hold values of quality attributes.
-const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
@@ -249,7 +246,7 @@ impl BeliefUpdate<'_> {
                 self.changes.base = Base::Watched;
             }
             self.changes.facts |= PLANNED.contains(&name);
-            if VALUES.contains(&name) {
+            if VALUE_PROPERTIES.contains(&name) {
                 // A derived value is an estimation, which plans depend on. A reported value is a measurement.
                 self.changes.facts |=
                     if is_insertion { !engine.is_asserted(fact) } else { !is_replaced(fact) };

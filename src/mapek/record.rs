@@ -298,10 +298,8 @@ pub(crate) fn statement_from_record(record: &Value) -> Option<Statement> {
 /// Serialises an element of `:init`. Returns `None` for timed initial literals, which never change.
 pub(super) fn element_to_record(element: &InitialElement) -> Option<Value> {
     let words = |atom: &Atom| -> Vec<String> {
-        let arguments = atom.arguments.iter().map(|term| match term {
-            Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.to_string(),
-        });
-        std::iter::once(atom.predicate.name.to_string()).chain(arguments).collect()
+        let arguments = atom.arguments.iter().map(Term::name);
+        std::iter::once(&atom.predicate.name).chain(arguments).map(ToString::to_string).collect()
     };
     match element {
         InitialElement::Fact(atom) => Some(json!([words(atom), true])),

@@ -1,7 +1,7 @@
 //! Parses the conditions and numeric functions of a manifest against the declarations of the
 //! mission's domain and problem.
 
-use pddl::ast::{Atom, Condition, Expression, Term};
+use pddl::ast::{Atom, Condition, Expression};
 
 use ::mission::Mission;
 
@@ -77,9 +77,7 @@ pub(super) fn setting(mission: &Mission, name: &str, value: &str) -> Option<Mess
 
 /// Formats a ground atom as the validator does: `(distance a b)`.
 pub fn written(atom: &Atom) -> String {
-    let words = atom.arguments.iter().map(|term| match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.as_str(),
-    });
+    let words = atom.arguments.iter().map(|term| term.name().as_str());
     let words: Vec<&str> = std::iter::once(atom.predicate.name.as_str()).chain(words).collect();
     format!("({})", words.join(" "))
 }

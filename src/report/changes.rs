@@ -104,9 +104,7 @@ fn stated(mission: &Mission) -> BTreeSet<String> {
 }
 
 fn shown(atom: &Atom) -> String {
-    let arguments = atom.arguments.iter().map(|term| match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
-    });
+    let arguments = atom.arguments.iter().map(Term::name);
     let words: Vec<&str> = std::iter::once(&atom.predicate.name).chain(arguments).map(Name::as_str).collect();
     format!("({})", words.join(" "))
 }

@@ -82,8 +82,7 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
         let text = format!("the conclusions are unknown: {}", fault.message);
         return vec![Reason { text, supports: Vec::new() }];
     }
-    let designs = knowledge.view().function_designs();
-    let design = designs.iter().find(|candidate| candidate.individual.name == design);
+    let design = knowledge.catalogue().designs().iter().find(|candidate| candidate.individual.name == design);
     let Some(design) = design else { return Vec::new() };
     let Causes { causes, are_all_needed } = causes(knowledge, design);
     let count = causes.len();

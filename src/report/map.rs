@@ -124,18 +124,12 @@ fn names(r#type: &TypeExpression) -> impl Iterator<Item = &Name> {
 
 fn same_but_last(left: &Atom, right: &Atom) -> bool {
     let but_last = |atom: &Atom| {
-        let terms = atom.arguments.iter().map(|term| name_of(term).clone());
+        let terms = atom.arguments.iter().map(|term| term.name().clone());
         terms.take(atom.arguments.len().saturating_sub(1)).collect::<Vec<_>>()
     };
     left.predicate.name == right.predicate.name
         && left.arguments.len() == right.arguments.len()
         && but_last(left) == but_last(right)
-}
-
-fn name_of(term: &Term) -> &Name {
-    match term {
-        Term::Variable(identifier) | Term::Constant(identifier) => &identifier.name,
-    }
 }
 
 /// Returns the objects of a type and its subtypes, in the order of the files.
@@ -164,7 +158,7 @@ fn objects(domain: &Domain, problem: &Problem, r#type: &TypeExpression) -> Vec<N
 /// Returns the last arguments of the atoms with these predicates: the places where something is.
 fn ends<'p>(atoms: impl Iterator<Item = &'p Atom>, predicates: &BTreeSet<&Name>) -> BTreeSet<Name> {
     let matching = atoms.filter(|atom| predicates.contains(&atom.predicate.name));
-    matching.filter_map(|atom| atom.arguments.last()).map(|term| name_of(term).clone()).collect()
+    matching.filter_map(|atom| atom.arguments.last()).map(|term| term.name().clone()).collect()
 }
 
 fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
@@ -191,7 +185,7 @@ fn ways(problem: &Problem, number: &BTreeMap<&Name, usize>, moving: &BTreeSet<&N
             _ => continue,
         };
         let places: Vec<usize> =
-            atom.arguments.iter().filter_map(|term| number.get(name_of(term)).copied()).collect();
+            atom.arguments.iter().filter_map(|term| number.get(term.name()).copied()).collect();
         if let [one, other] = places[..]
             && one != other
             && !moving.contains(&atom.predicate.name)

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use num_traits::ToPrimitive as _;
-use pddl::ast::{InitialElement, Name, Problem, Term};
+use pddl::ast::{InitialElement, Name, Problem};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -80,7 +80,7 @@ fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
     let value = |element: &InitialElement| match element {
         InitialElement::Value(atom, value, _) if atom.predicate.name == function => match &atom.arguments[..]
         {
-            [Term::Constant(place) | Term::Variable(place)] => Some((place.name.clone(), value.to_f64()?)),
+            [place] => Some((place.name().clone(), value.to_f64()?)),
             _ => None,
         },
         _ => None,

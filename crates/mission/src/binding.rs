@@ -433,10 +433,7 @@ impl Fill<'_> {
 }
 
 fn names(terms: &[Term]) -> Vec<Name> {
-    let name = |term: &Term| match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.clone(),
-    };
-    terms.iter().map(name).collect()
+    terms.iter().map(Term::name).cloned().collect()
 }
 
 pub(super) fn identifier(name: &Name) -> Identifier {

@@ -176,8 +176,7 @@ fn stated(engine: &Engine, iri: &str) -> (Vec<Fact>, Vec<Fact>) {
 /// Warns about components that occur only as values in facts about other individuals, and about components that no
 /// design requires. A component counts as unrequired only if other components are required and no other fact links it.
 fn components(knowledge: &Knowledge) -> Vec<Message> {
-    let (engine, view) = (knowledge.engine(), knowledge.view());
-    let designs = view.function_designs();
+    let (engine, view, designs) = (knowledge.engine(), knowledge.view(), knowledge.catalogue().designs());
     let required: BTreeSet<&str> = designs
         .iter()
         .flat_map(|design| &design.components)
@@ -190,12 +189,10 @@ fn components(knowledge: &Knowledge) -> Vec<Message> {
         let (about, referring) = stated(engine, &component.iri);
         if about.is_empty() {
             let candidates = names.iter().map(String::as_str).filter(|name| **name != component.name);
-            let suggestion =
-                nearest(&component.name, candidates).map(|name| format!("; did you mean `{name}`?"));
+            let suggestion = did_you_mean(&component.name, candidates);
             let text = format!(
-                "the component <{}> is only mentioned and has no other statement{}",
-                component.iri,
-                suggestion.unwrap_or_default()
+                "the component <{}> is only mentioned and has no other statement{suggestion}",
+                component.iri
             );
             doubts.push(doubt_about(knowledge, "M207", &component.iri, text));
         } else if !required.is_empty()
@@ -223,8 +220,7 @@ fn is_plain(engine: &Engine, fact: &Fact) -> bool {
 /// Warns about attributes that are only mentioned, about attributes that nothing estimates, measures or
 /// bounds, and about bounds of actions on attributes that no design estimates.
 fn attributes(knowledge: &Knowledge) -> Vec<Message> {
-    let (engine, view) = (knowledge.engine(), knowledge.view());
-    let designs = view.function_designs();
+    let (engine, view, designs) = (knowledge.engine(), knowledge.view(), knowledge.catalogue().designs());
     let estimated: BTreeSet<&str> = designs.iter().flat_map(estimates).collect();
     let bounded: BTreeSet<&str> = designs
         .iter()
@@ -252,9 +248,7 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     for quality in view.actions().into_iter().flat_map(|action| action.quality) {
         let attribute = quality.bounds.attribute.as_str();
         if !estimated.contains(attribute) {
-            let suggestion = nearest(attribute, estimated.iter().copied());
-            let suggestion =
-                suggestion.map_or_else(String::new, |suggestion| format!("; did you mean `{suggestion}`?"));
+            let suggestion = did_you_mean(attribute, estimated.iter().copied());
             let text = format!(
                 "<{}> bounds `{attribute}`, which no design estimates, so every design satisfies it{suggestion}",
                 quality.individual.iri

@@ -80,10 +80,9 @@ impl Mission {
         let mut words = name.split_whitespace();
         let symbol = words.next().map(Name::new);
         let arguments = words.count();
-        let declared = self.domain.functions.iter();
-        declared
-            .into_iter()
-            .any(|d| Some(&d.identifier.name) == symbol.as_ref() && d.parameters.len() == arguments)
+        let is_meant =
+            |d: &Declaration| Some(&d.identifier.name) == symbol.as_ref() && d.parameters.len() == arguments;
+        self.domain.functions.iter().any(is_meant)
     }
 
     /// Returns `true` if the problem states a fact, given without parentheses: `predicate
@@ -92,7 +91,7 @@ impl Mission {
         let words: Vec<Name> = fact.split_whitespace().map(Name::new).collect();
         self.problem.init.iter().any(|element| match element {
             InitialElement::Fact(atom) => {
-                let arguments = atom.arguments.iter().map(name_of);
+                let arguments = atom.arguments.iter().map(Term::name);
                 std::iter::once(&atom.predicate.name).chain(arguments).eq(&words)
             }
             _ => false,
@@ -166,7 +165,7 @@ impl Mission {
             .collect();
         let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
         if let Some(predicate) = declared.into_iter().find(|name| self.bindings.is_availability(name)) {
-            let decides = |atom: &Atom| atom.arguments.iter().any(|term| self.own.contains(name_of(term)));
+            let decides = |atom: &Atom| atom.arguments.iter().any(|term| self.own.contains(term.name()));
             let is_known = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate && !decides(atom));
             problem.init.retain(|element| !is_known(element));
             let facts =
@@ -243,8 +242,8 @@ impl Mission {
         let problem_designs = self.own.iter().filter(|design| {
             self.problem.init.iter().any(|element| match element {
                 InitialElement::Fact(atom) => {
-                    let named: Vec<&Name> = atom.arguments.iter().map(name_of).collect();
-                    named == [*design, &function] && self.bindings.solves().contains(&atom.predicate.name)
+                    self.bindings.solves().contains(&atom.predicate.name)
+                        && atom.arguments.iter().map(Term::name).eq([*design, &function])
                 }
                 _ => false,
             })
@@ -253,19 +252,9 @@ impl Mission {
     }
 }
 
-fn name_of(term: &Term) -> &Name {
-    match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
-    }
-}
-
 fn is_named(atom: &Atom, words: &[&str]) -> bool {
-    let is_equal = |(term, word): (&Term, &&str)| match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(word),
-    };
     words.split_first().is_some_and(|(symbol, arguments)| {
-        atom.predicate.name == Name::new(symbol)
-            && atom.arguments.len() == arguments.len()
-            && atom.arguments.iter().zip(arguments).all(is_equal)
+        let arguments = || arguments.iter().map(|word| Name::new(word)).collect::<Vec<_>>();
+        atom.predicate.name == Name::new(symbol) && atom.arguments.iter().map(Term::name).eq(&arguments())
     })
 }

@@ -219,10 +219,7 @@ fn same_atom(atom: &Atom, predicate: &Name, arguments: &[Name]) -> bool {
 }
 
 fn same_terms(terms: &[Term], arguments: &[Name]) -> bool {
-    let is_equal = |(term, argument): (&Term, &Name)| match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == *argument,
-    };
-    terms.len() == arguments.len() && terms.iter().zip(arguments).all(is_equal)
+    terms.iter().map(Term::name).eq(arguments)
 }
 
 /// Parses a decimal as an exact number: `-12`, `0.25`, `1e2`.

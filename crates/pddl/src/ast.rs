@@ -310,6 +310,14 @@ pub enum Term {
     Constant(Identifier),
 }
 
+impl Term {
+    /// Returns the name of the variable or constant.
+    pub fn name(&self) -> &Name {
+        let (Self::Variable(identifier) | Self::Constant(identifier)) = self;
+        &identifier.name
+    }
+}
+
 /// A predicate or a numeric function applied to terms.
 #[derive(Debug, Clone)]
 pub struct Atom {
@@ -483,10 +491,7 @@ impl InitialElement {
     /// Returns the predicate and the arguments of a fact, and `None` for other elements.
     pub fn fact(&self) -> Option<(Name, Vec<Name>)> {
         let Self::Fact(atom) = self else { return None };
-        let name = |term: &Term| match term {
-            Term::Variable(identifier) | Term::Constant(identifier) => identifier.name.clone(),
-        };
-        Some((atom.predicate.name.clone(), atom.arguments.iter().map(name).collect()))
+        Some((atom.predicate.name.clone(), atom.arguments.iter().map(Term::name).cloned().collect()))
     }
 }
 

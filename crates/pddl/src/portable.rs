@@ -129,10 +129,7 @@ fn merge_types(objects: &mut Vec<TypedName>) {
 }
 
 fn names(atom: &Atom) -> Vec<Name> {
-    let name = |term: &Term| match term {
-        Term::Variable(identifier) | Term::Constant(identifier) => identifier.name.clone(),
-    };
-    atom.arguments.iter().map(name).collect()
+    atom.arguments.iter().map(Term::name).cloned().collect()
 }
 
 /// Pairs of requirement flags: a file that states the second flag need not state the first.

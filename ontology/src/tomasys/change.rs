@@ -23,18 +23,34 @@ pub enum Status {
     Working,
 }
 
+impl Status {
+    /// Returns the spelling of the status in MROS: `FALSE`, `RECOVERED` or `TRUE`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Failed => "FALSE",
+            Self::Recovered => "RECOVERED",
+            Self::Working => "TRUE",
+        }
+    }
+
+    /// Returns the status with this spelling in MROS.
+    pub fn from_word(word: &str) -> Option<Self> {
+        [Self::Failed, Self::Recovered, Self::Working].into_iter().find(|status| status.word() == word)
+    }
+}
+
 /// Returns the spellings of a status in the supported vocabularies: a string in MROS, another string in
 /// PLANTA, and a boolean in older vocabularies.
 fn spellings(status: Status) -> Vec<Literal> {
-    let (mros, planta, truth) = match status {
-        Status::Failed => ("FALSE", "ERROR", false),
-        Status::Recovered => ("RECOVERED", "OK", true),
-        Status::Working => ("TRUE", "OK", true),
+    let (planta, truth) = match status {
+        Status::Failed => ("ERROR", false),
+        Status::Recovered | Status::Working => ("OK", true),
     };
-    vec![Literal::string(mros), Literal::string(planta), Literal::Boolean(truth)]
+    vec![Literal::string(status.word()), Literal::string(planta), Literal::Boolean(truth)]
 }
 
-pub(crate) fn is_failed(status: &str) -> bool {
+/// Returns `true` if a status denotes a failure, in any spelling.
+pub fn is_failed(status: &str) -> bool {
     spells(Status::Failed, status)
 }
 

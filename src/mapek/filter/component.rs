@@ -70,7 +70,7 @@ impl ComponentState {
     }
 
     pub(crate) fn to_record(&self) -> Value {
-        json!([self.has_failed, self.change.map(|(since, status)| json!([since, word(status)])), self.held])
+        json!([self.has_failed, self.change.map(|(since, status)| json!([since, status.word()])), self.held])
     }
 
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
@@ -79,23 +79,9 @@ impl ComponentState {
             has_failed: if has_failed.is_null() { None } else { Some(has_failed.as_bool()?) },
             change: match change {
                 Value::Null => None,
-                pair => Some((pair.get(0)?.as_u64()?, status(pair.get(1)?.as_str()?)?)),
+                pair => Some((pair.get(0)?.as_u64()?, Status::from_word(pair.get(1)?.as_str()?)?)),
             },
             held: held.as_u64()?,
         })
     }
-}
-
-pub(super) fn word(status: Status) -> &'static str {
-    match status {
-        Status::Failed => "FALSE",
-        Status::Recovered => "RECOVERED",
-        Status::Working => "TRUE",
-    }
-}
-
-fn status(word: &str) -> Option<Status> {
-    [Status::Failed, Status::Recovered, Status::Working]
-        .into_iter()
-        .find(|candidate| self::word(*candidate) == word)
 }

@@ -15,13 +15,13 @@ use std::time::Duration;
 
 use num_rational::BigRational;
 use num_traits::{Signed as _, Zero as _};
-use ontology::tomasys::change::Status;
+use ontology::tomasys::change::{Status, is_failed};
 use ontology::vocab::{local_name, tomasys};
 use serde_json::{Value, json};
 
 pub use attribute::Stale;
 use attribute::{AttributeFilter, AttributeState, Bound, Elapsed, Side, Verdict};
-use component::{ComponentFilter, ComponentState, word};
+use component::{ComponentFilter, ComponentState};
 pub(crate) use section::{ComponentsSection, MeasuredsSection, filters};
 use settings::micros;
 pub use settings::{ComponentTimes, FilterSettings, MeasuredSettings};
@@ -136,7 +136,7 @@ impl Filters {
         let values: BTreeMap<String, Option<BigRational>> = values.collect();
         let state = |name: &String| AttributeState::believing(values.get(name).cloned().flatten());
         let statuses = view.components().into_iter().filter_map(|element| {
-            let has_failed = ["FALSE", "ERROR", "false"].contains(&element.status?.as_str());
+            let has_failed = is_failed(&element.status?);
             // Only a reported failure delays a recovery: a failure stated by the mission is corrected at once.
             (!has_failed).then(|| (element.individual.name, ComponentState::believing(Some(false))))
         });
@@ -196,7 +196,7 @@ impl Filters {
         if !is_believed && is_reported(state.held) {
             answers.push(Answer::Filtered {
                 name: name.to_owned(),
-                value: json!(word(status)),
+                value: json!(status.word()),
                 because: if status == Status::Failed { "confirm" } else { "heal" },
                 held: state.held,
                 due: filter.due(state).map(Duration::from_micros),

@@ -7,13 +7,7 @@ use pddl::ast::{
 pub(super) type Binding<'a> = Vec<(&'a Name, Name)>;
 
 pub(super) fn constants(atom: &Atom) -> Vec<Name> {
-    atom.arguments.iter().map(name_of).cloned().collect()
-}
-
-pub(super) fn name_of(term: &Term) -> &Name {
-    match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
-    }
+    atom.arguments.iter().map(Term::name).cloned().collect()
 }
 
 pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a Name> {

@@ -8,8 +8,8 @@ use std::sync::{Arc, OnceLock};
 use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::change::Status;
-use ontology::tomasys::{CalledNames, View};
-use ontology::vocab::local_name;
+use ontology::tomasys::{CalledNames, Individual, View};
+use ontology::vocab::{local_name, tomasys};
 use ontology::{Annotation, EntityKind, Equality, Iri};
 use rules::{Delta, Engine, Fact, Literal, Program, Symbols};
 use tracing::info_span;
@@ -18,6 +18,7 @@ use crate::file::{discreet, quoted};
 use crate::knowledge::catalogue::Catalogue;
 use crate::knowledge::sources::{Sources, Stated};
 use crate::knowledge::statement::{Statement, Statements};
+use crate::knowledge::value_reads::{ValueRead, is_read, value_reads};
 use crate::knowledge::waiting::Waiting;
 use crate::message::{Errors, Message};
 use crate::planta::Terms;
@@ -30,6 +31,7 @@ const MANY_NAMES: usize = 32;
 pub struct Knowledge {
     pub(super) runtime: Runtime,
     pub(super) catalogue: OnceLock<Arc<Catalogue>>,
+    value_reads: OnceLock<Arc<[Vec<ValueRead>]>>,
     pub(super) waiting: Waiting,
     /// State of the documents as read and revised, without reports. Shares all unchanged data with `runtime`.
     origin: Runtime,
@@ -118,8 +120,7 @@ impl Knowledge {
         let engine = Engine::new(symbols, program, facts)
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let runtime = Runtime::new(engine, Mode::Retract);
-        let (sources, entities) = (Sources::default(), Arc::default());
-        Ok(Self::of(runtime, 0, Vec::new(), sources, entities))
+        Ok(Self::of(runtime, 0, Vec::new(), Sources::default(), Arc::default()))
     }
 
     /// Sets the translation of the ontology to PDDL, for a domain in PLANTA's form, and the asserted
@@ -149,20 +150,19 @@ impl Knowledge {
         sources: Sources,
         entities: Arc<[(EntityKind, Iri)]>,
     ) -> Self {
-        let (catalogue, waiting, origin) = (OnceLock::new(), Waiting::default(), runtime.clone());
-        let (documents, annotations) = (Arc::default(), Arc::default());
         Self {
+            origin: runtime.clone(),
             runtime,
-            catalogue,
-            waiting,
-            origin,
+            catalogue: OnceLock::new(),
+            value_reads: OnceLock::new(),
+            waiting: Waiting::default(),
             rule_count,
             warnings,
             sources,
             called: Arc::default(),
             entities,
-            documents,
-            annotations,
+            documents: Arc::default(),
+            annotations: Arc::default(),
             terms: None,
             documented: Arc::default(),
             stated: None,
@@ -222,10 +222,10 @@ impl Knowledge {
         &self.runtime
     }
 
-    /// Returns the runtime for modification. Discards the cached designs, actions and measured
+    /// Returns the runtime for modification. Discards the cached designs, actions, measured values and reads of
     /// values.
     pub fn runtime_mut(&mut self) -> &mut Runtime {
-        self.catalogue = OnceLock::new();
+        (self.catalogue, self.value_reads) = (OnceLock::new(), OnceLock::new());
         &mut self.runtime
     }
 
@@ -233,6 +233,27 @@ impl Knowledge {
     /// on first use and cached.
     pub fn catalogue(&self) -> &Catalogue {
         self.catalogue.get_or_init(|| Arc::new(Catalogue::new(&self.view())))
+    }
+
+    /// Returns the reads of values by each rule and axiom, in the order of the program. The result is computed on first
+    /// use and cached.
+    pub fn value_reads(&self) -> &[Vec<ValueRead>] {
+        self.value_reads.get_or_init(|| value_reads(self.engine()))
+    }
+
+    /// Returns `true` if a measured value of the attribute can have an effect: the attribute has a measurement, a
+    /// design has a bound on it, it has a comparison operator, or a rule or an axiom can read its value. Also if the
+    /// domain is in PLANTA's form, which can refer to all values. The attribute is given by the IRI or local name of
+    /// its type. Axioms that only report contradictions do not count.
+    pub fn uses_measurement(&self, attribute: &str) -> bool {
+        let Some(kind) = self.attribute(attribute) else { return false };
+        let catalogue = self.catalogue();
+        let mut requirements = catalogue.designs().iter().flat_map(|design| &design.requirements);
+        self.terms().is_some()
+            || catalogue.measurements().iter().any(|measurement| measurement.attribute == kind.name)
+            || requirements.any(|bound| bound.attribute == kind.name)
+            || !self.view().values(&kind.iri, tomasys::QA_COMPARISON_OPERATOR).is_empty()
+            || is_read(self.engine(), self.value_reads(), &kind.iri)
     }
 
     pub(super) fn follow(&mut self, delta: &Delta) {
@@ -259,23 +280,20 @@ impl Knowledge {
     /// Returns the local name of a component, given by IRI, local name or object name. `None` if
     /// there is no such component.
     pub fn known_component(&self, name: &str) -> Option<String> {
-        let name = self.component(name);
-        let components = self.runtime.view().components().into_iter().map(|component| component.individual);
-        components
-            .into_iter()
-            .find(|component| component.name == name || component.iri == name)
-            .map(|component| component.name)
+        self.component_named(&self.component(name))
+    }
+
+    /// Like [`Knowledge::known_component`], but without object names.
+    fn component_named(&self, name: &str) -> Option<String> {
+        let mut components =
+            self.runtime.view().components().into_iter().map(|component| component.individual);
+        Some(components.find(|component| component.name == name || component.iri == name)?.name)
     }
 
     /// Resolves an object name to the IRI of its individual. Returns `name` itself if a component
     /// has this IRI or local name, or if no individual has this object name.
     pub(super) fn component(&self, name: &str) -> String {
-        let iri = self.called_so(name).filter(|_| {
-            let components = self.runtime.view().components();
-            !components
-                .iter()
-                .any(|component| component.individual.name == name || component.individual.iri == name)
-        });
+        let iri = self.called_so(name).filter(|_| self.component_named(name).is_none());
         iri.unwrap_or(name).to_owned()
     }
 
@@ -436,7 +454,11 @@ impl Knowledge {
 
     /// Returns `true` if an attribute type has this local name or IRI.
     pub fn has_attribute(&self, name: &str) -> bool {
-        self.view().attribute_types().iter().any(|attribute| attribute.name == name || attribute.iri == name)
+        self.attribute(name).is_some()
+    }
+
+    fn attribute(&self, name: &str) -> Option<Individual> {
+        self.view().attribute_types().into_iter().find(|kind| kind.name == name || kind.iri == name)
     }
 
     /// Inserts and deletes assertions.
@@ -470,7 +492,8 @@ impl Knowledge {
                 .revise(change.delta.clone(), change.program.clone())
                 .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         }
-        (self.runtime, self.origin, self.catalogue) = (runtime, origin, OnceLock::new());
+        (self.runtime, self.origin) = (runtime, origin);
+        (self.catalogue, self.value_reads) = (OnceLock::new(), OnceLock::new());
         let ontology = change.stated.ontology();
         self.entities = ontology.entities.as_slice().into();
         self.annotations = ontology.annotations.as_slice().into();

@@ -64,9 +64,7 @@ impl RobotReport {
 
     fn to_record(&self) -> (&'static str, String) {
         match self {
-            Self::Component(Status::Failed) => ("component", "FALSE".to_owned()),
-            Self::Component(Status::Recovered) => ("component", "RECOVERED".to_owned()),
-            Self::Component(Status::Working) => ("component", "TRUE".to_owned()),
+            Self::Component(status) => ("component", status.word().to_owned()),
             Self::Measured(value) => ("measured", value.lexical()),
             Self::Unmeasured => ("unmeasured", String::new()),
             Self::Design(realisable) => ("design", realisable.to_string()),
@@ -75,9 +73,7 @@ impl RobotReport {
 
     fn from_record(kind: &str, word: &str) -> Option<Self> {
         match (kind, word) {
-            ("component", "FALSE") => Some(Self::Component(Status::Failed)),
-            ("component", "RECOVERED") => Some(Self::Component(Status::Recovered)),
-            ("component", "TRUE") => Some(Self::Component(Status::Working)),
+            ("component", word) => Status::from_word(word).map(Self::Component),
             ("unmeasured", _) => Some(Self::Unmeasured),
             ("design", word) => word.parse().ok().map(Self::Design),
             ("measured", number) => {

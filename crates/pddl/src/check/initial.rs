@@ -14,10 +14,7 @@ use super::{Checker, Scope};
 type Key<'a> = (&'a Name, SmallVec<[&'a Name; 4]>);
 
 fn key(atom: &Atom) -> Key<'_> {
-    let arguments = atom.arguments.iter().map(|term| match term {
-        Term::Variable(identifier) | Term::Constant(identifier) => &identifier.name,
-    });
-    (&atom.predicate.name, arguments.collect())
+    (&atom.predicate.name, atom.arguments.iter().map(Term::name).collect())
 }
 
 impl<'a> Checker<'a> {

@@ -320,9 +320,7 @@ impl Parser<'_> {
         let (term, value_item) = if self.is_object_fluent(left) { (left, right) } else { (right, left) };
         let (predicate, mut arguments) = self.object_term(term)?;
         let value = if is_undefined(value_item) { None } else { Some(self.object(value_item)?) };
-        let name = |term: &Term| match term {
-            Term::Variable(identifier) | Term::Constant(identifier) => identifier.name.clone(),
-        };
+        let name = |term: &Term| term.name().clone();
         let key = (predicate.name.clone(), arguments.iter().map(name).collect());
         let (value_name, span) = (
             value.as_ref().map(name),

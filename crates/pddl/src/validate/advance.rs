@@ -160,12 +160,8 @@ impl Advance {
 }
 
 fn is_same(left: &Atom, right: &Atom) -> bool {
-    let name = |term: &Term| match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.clone(),
-    };
     left.predicate.name == right.predicate.name
-        && left.arguments.len() == right.arguments.len()
-        && left.arguments.iter().zip(&right.arguments).all(|(left, right)| name(left) == name(right))
+        && left.arguments.iter().map(Term::name).eq(right.arguments.iter().map(Term::name))
 }
 
 /// Returns the metric value if the plan ended in the initial state of the problem after `total_time`, in the

@@ -51,9 +51,9 @@ pub(super) fn relevant(
     let mentioned = Mentioned::by_domain(domain).objects;
     let arguments = steps.iter().flat_map(|step| &step.arguments).chain(&mentioned);
     let terms = read.iter().flat_map(|atom| &atom.arguments);
-    let constants = terms.map(name);
+    let constants = terms.map(Term::name);
     let objects: FxHashSet<&Name> = arguments.chain(constants).collect();
-    let is_named = |atom: &Atom| atom.arguments.iter().all(|term| objects.contains(name(term)));
+    let is_named = |atom: &Atom| atom.arguments.iter().all(|term| objects.contains(term.name()));
     let is_relevant = |element: &&InitialElement| match element {
         InitialElement::Timed(..) => true,
         InitialElement::Value(atom, ..) => is_named(atom) || metric_functions.contains(&atom.predicate.name),
@@ -81,7 +81,7 @@ pub fn may_read(domain: &Domain, problem: &Problem, step: &PlanStep, objects: &B
         let mut is_mentioned = false;
         action.body.walk(&mut |node| {
             let mut terms = node.atom().into_iter().flat_map(|atom| &atom.arguments);
-            is_mentioned |= terms.any(|term| objects.contains(name(term)));
+            is_mentioned |= terms.any(|term| objects.contains(term.name()));
         });
         is_mentioned
     };
@@ -94,12 +94,6 @@ pub fn may_read(domain: &Domain, problem: &Problem, step: &PlanStep, objects: &B
 /// Returns `true` if there are axioms or constraints, which can read every fact.
 fn reads_all_facts(domain: &Domain, problem: &Problem) -> bool {
     !domain.derived.is_empty() || !domain.constraints.is_empty() || !problem.constraints.is_empty()
-}
-
-fn name(term: &Term) -> &Name {
-    match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
-    }
 }
 
 /// Returns `true` if the action contains a quantifier or a preference, and so may read facts about any

@@ -5,9 +5,7 @@ use num_traits::Zero;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
-use crate::ast::{
-    Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
-};
+use crate::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, TypeExpression, TypedName};
 use crate::number::dense;
 use crate::types::TypeHierarchy;
 
@@ -222,9 +220,7 @@ impl<'p> World<'p> {
     }
 
     pub(super) fn ground(&self, atom: &Atom) -> (Symbol, Arguments) {
-        let arguments = atom.arguments.iter().map(|term| match term {
-            Term::Variable(identifier) | Term::Constant(identifier) => self.symbol(&identifier.name),
-        });
+        let arguments = atom.arguments.iter().map(|term| self.symbol(term.name()));
         (self.symbol(&atom.predicate.name), arguments.collect())
     }
 
