@@ -89,7 +89,8 @@ impl Setup {
     ///
     /// # Errors
     /// The faults of the manifest's text; otherwise those of its settings and of the files that it names; otherwise
-    /// names in the settings of filters that the knowledge base does not have. Faulty settings hide faults that only
+    /// names in the settings of filters that the knowledge base does not have, and faults of the section
+    /// `probabilistic`. Faulty settings hide faults that only
     /// the whole mission shows. Scenarios are not checked; see [`Setup::mistakes`].
     pub fn read(manifest: &Path) -> Result<Self, Errors> {
         let (sections, origin) = manifest::read(manifest)?;
@@ -130,7 +131,14 @@ impl Setup {
             wrong.extend(origin.quote(more));
             wrong
         })?;
-        settings.check(mission.knowledge(), &origin)?;
+        let mut mistakes: Vec<Message> =
+            settings.check(mission.knowledge(), &origin).err().into_iter().flatten().collect();
+        let of_process = sections.probabilistic.mistakes(&mission).into_iter().map(|(key, message)| {
+            let place = origin.place_of(&["probabilistic".into(), key.into()], Part::Value);
+            Message::at(&message.code, origin.file(), place, message.message.clone())
+        });
+        mistakes.extend(origin.quote(of_process));
+        Errors::unless_empty(mistakes)?;
         mission.change_warnings(|warnings| origin.quote(warnings));
         let Sections { description, planning, probabilistic: roles, report, scenarios, .. } = sections;
         let time_unit = planning.time_unit;
