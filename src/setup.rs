@@ -90,8 +90,8 @@ impl Setup {
     /// # Errors
     /// The faults of the manifest's text; otherwise those of its settings and of the files that it names; otherwise
     /// names in the settings of filters that the knowledge base does not have, and faults of the section
-    /// `probabilistic`. Faulty settings hide faults that only
-    /// the whole mission shows. Scenarios are not checked; see [`Setup::mistakes`].
+    /// `probabilistic`. Faulty settings hide faults that only the whole mission shows. Scenarios are not checked; see
+    /// [`Setup::mistakes`].
     pub fn read(manifest: &Path) -> Result<Self, Errors> {
         let (sections, origin) = manifest::read(manifest)?;
         Self::of(sections, origin)
