@@ -95,7 +95,7 @@ fn shorten(action: &mut Action, done: &BigRational) {
     let time_left = remaining_share.clone().max(BigRational::new(1.into(), LEAST_LEFT.into()));
     let whole = duration.iter().find(|constraint| constraint.operator == Comparison::Equal);
     let whole = whole.map(|constraint| constraint.expression.clone());
-    let (mut all_changes, mut end_changes): (Vec<NumericChange>, Vec<NumericChange>) = Default::default();
+    let (mut all_changes, mut end_changes) = (Vec::<NumericChange>::new(), Vec::new());
     for (time, effect) in effects.iter_mut() {
         let mut changes = Vec::new();
         shorten_effect(effect, &remaining_share, whole.as_ref(), false, &mut changes);
