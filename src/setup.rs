@@ -5,7 +5,7 @@
 //! section defines is rejected.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use pddl::ast::Name;
 use schemars::{JsonSchema, Schema, schema_for};
@@ -13,7 +13,7 @@ use serde::Deserialize;
 
 use crate::comparison::Roles;
 use crate::file::source;
-use crate::knowledge::Knowledge;
+use crate::knowledge::{COADAPTATION, Knowledge, TOMASYS};
 use crate::manifest::{self, Key, ManifestPath, Part};
 use crate::mapek::{AdaptationSection, Settings};
 use crate::message::{Errors, Message, did_you_mean};
@@ -70,6 +70,7 @@ pub struct Setup {
     /// Scenarios by name.
     pub scenarios: BTreeMap<String, Scenario<Simulation>>,
     report: ReportSection,
+    files: Vec<PathBuf>,
     origin: ManifestPath,
 }
 
@@ -89,8 +90,9 @@ impl Setup {
     ///
     /// # Errors
     /// The faults of the manifest's text; otherwise those of its settings and of the files that it names; otherwise
-    /// names in the settings of filters that the knowledge base does not have. Faulty settings hide faults that only
-    /// the whole mission shows. Scenarios are not checked; see [`Setup::mistakes`].
+    /// names in the settings of filters that the knowledge base does not have, and faults of the section
+    /// `probabilistic`. Faulty settings hide faults that only the whole mission shows. Scenarios are not checked; see
+    /// [`Setup::mistakes`].
     pub fn read(manifest: &Path) -> Result<Self, Errors> {
         let (sections, origin) = manifest::read(manifest)?;
         Self::of(sections, origin)
@@ -113,6 +115,8 @@ impl Setup {
         wrong.extend(bindings.as_ref().err().into_iter().flatten().cloned());
         let (domain, problem) =
             (origin.path(&sections.planning.domain), origin.path(&sections.planning.problem));
+        let mut files = vec![domain.clone(), problem.clone()];
+        files.extend(sections.report.file(&origin));
         let (domain, problem) = (source(&domain), source(&problem));
         let text = domain.as_ref().map_or("", |domain| domain.text());
         let knowledge = Knowledge::read_for(&sections.knowledge.sources(&origin), text);
@@ -130,12 +134,20 @@ impl Setup {
             wrong.extend(origin.quote(more));
             wrong
         })?;
-        settings.check(mission.knowledge(), &origin)?;
+        let mut mistakes: Vec<Message> =
+            settings.check(mission.knowledge(), &origin).err().into_iter().flatten().collect();
+        let of_process = sections.probabilistic.mistakes(&mission).into_iter().map(|(key, message)| {
+            let place = origin.place_of(&["probabilistic".into(), key.into()], Part::Value);
+            Message::at(&message.code, origin.file(), place, message.message.clone())
+        });
+        mistakes.extend(origin.quote(of_process));
+        Errors::unless_empty(mistakes)?;
         mission.change_warnings(|warnings| origin.quote(warnings));
         let Sections { description, planning, probabilistic: roles, report, scenarios, .. } = sections;
         let time_unit = planning.time_unit;
         let settings = settings.with_time_unit(time_unit);
-        Ok(Self { mission, description, settings, time_unit, roles, scenarios, report, origin })
+        files.extend(mission.knowledge().into_iter().flat_map(files_of));
+        Ok(Self { mission, description, settings, time_unit, roles, scenarios, report, files, origin })
     }
 
     /// Applies a scenario of the manifest to the mission of this setup. Settings that fit the mission are applied even
@@ -258,10 +270,25 @@ impl Setup {
         self.origin.quote([wrong]).swap_remove(0)
     }
 
+    /// Returns the paths of the files that the manifest names: PDDL files, knowledge bases with their imports,
+    /// rules, catalogs and the positions of places. IRIs denote embedded knowledge bases. Empty for a mission without a
+    /// manifest.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
     /// Returns the name of the manifest's file; empty for a mission without a manifest.
     pub fn file(&self) -> &str {
         self.origin.file()
     }
+}
+
+/// Returns the documents, rule files and catalogs of a knowledge base.
+fn files_of(knowledge: &Knowledge) -> Vec<PathBuf> {
+    let sources = knowledge.sources();
+    let rules = sources.rules.iter().filter(|rule| ![COADAPTATION, TOMASYS].contains(&rule.as_str()));
+    let named = knowledge.documents().iter().chain(rules).map(PathBuf::from);
+    named.chain(sources.options.catalogs.iter().cloned()).collect()
 }
 
 /// Returns the JSON Schema of a manifest.
@@ -280,6 +307,7 @@ impl From<Mission> for Setup {
             roles: Roles::default(),
             scenarios: BTreeMap::new(),
             report: ReportSection::default(),
+            files: Vec::new(),
             origin: ManifestPath::default(),
         }
     }

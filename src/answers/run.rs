@@ -25,7 +25,7 @@ pub struct ReadyLine {
 pub(super) struct RecoveryPart {
     /// Whether the loop was restored from the journal.
     resumed: bool,
-    /// Number of handled lines.
+    /// Number of lines in the journal.
     lines: u64,
     /// Greatest sequence number of a line, or null if no line had a number.
     seq: Option<u64>,

@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::answers::{KeeperReadyLine, PlanningLine, ReadyLine};
-use crate::configure::Keeper;
-use crate::journal::{Journal, Policy, Recovery, Sync};
+use crate::configure::{Keeper, KeeperAnswer};
+use crate::journal::{Journal, Policy, Sync};
 use crate::knowledge::Knowledge;
-use crate::mapek::{Loop, Recoverable, Settings, Watch};
+use crate::mapek::{Answer, Loop, Recoverable, Settings, Watch};
 use crate::message::Message;
 use crate::setup::Setup;
 use clap::{Args, ValueEnum};
@@ -19,8 +19,8 @@ use crate::cli::configure::Wanted;
 use crate::cli::output;
 use crate::cli::run_keeper::KeeperSession;
 use crate::cli::run_lines::Lines;
-use crate::cli::run_outlet::{Outlet, Outlets, is_over};
-use crate::cli::run_session::Session;
+use crate::cli::run_outlet::{Outlet, Outlets, is_over, unwritten};
+use crate::cli::run_session::{Resumed, Session};
 use crate::cli::situation::{Situation, consistent};
 
 /// Arguments of `run`.
@@ -83,22 +83,19 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let mut control = Loop::new(mission, settings)?;
     let events = Lines::open(&arguments.events)?;
     let mut ready = ReadyLine::new(name.clone());
-    let journal = match journal(arguments, common, &mut control)? {
-        None => None,
-        Some((journal, recovery)) => {
-            ready.resume(control.beliefs(), &recovery);
-            Some(journal)
-        }
-    };
+    let resumed = journal(arguments, common, &mut control)?;
+    if let Some(Resumed { recovery, .. }) = &resumed {
+        ready.resume(control.beliefs(), recovery);
+    }
     let outlet = Outlet::open(&arguments.outlets, &name, painter)?;
-    ended(drive(common, control, journal, &ready, events, &outlet), &outlet)
+    ended(drive(common, control, resumed, &ready, events, &outlet), &outlet)
 }
 
-fn journal(
+fn journal<C: Recoverable>(
     arguments: &Arguments,
     common: &Common,
-    control: &mut impl Recoverable,
-) -> Result<Option<(Journal, Recovery)>, Message> {
+    control: &mut C,
+) -> Result<Option<Resumed<C::Answer>>, Message> {
     let Some(directory) = &arguments.journal else { return Ok(None) };
     let sync = match arguments.fsync {
         Fsync::Always => Sync::Always,
@@ -106,9 +103,11 @@ fn journal(
         Fsync::Never => Sync::Never,
     };
     let policy = Policy { sync, snapshot_every: arguments.snapshot_every };
-    let (journal, recovery) = Journal::open(directory, policy, control)?;
+    let (mut journal, recovery) = Journal::open(directory, policy, control)?;
     output::warnings(common, &recovery.warnings);
-    Ok(Some((journal, recovery)))
+    // The loop reacts before the line `ready` is printed, so that this line counts every event of the journal.
+    let answers = journal.begin_reacting(control).map_err(|error| unwritten(&error))?;
+    Ok(Some(Resumed { journal, recovery, answers }))
 }
 
 /// Closes the recording and the web page, also if the loop has failed.
@@ -124,7 +123,7 @@ fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> 
 fn drive(
     common: &Common,
     control: Loop,
-    journal: Option<Journal>,
+    resumed: Option<Resumed<Answer>>,
     ready: &ReadyLine,
     events: Lines,
     outlet: &Outlet,
@@ -135,7 +134,7 @@ fn drive(
     outlet.begin(&control);
     let line = Arc::new(AtomicU64::new(control.beliefs().lines()));
     heartbeat(control.watch(), Arc::clone(&line), outlet.clone());
-    let session = Session::new(common, control, journal, outlet, line);
+    let session = Session::new(common, control, resumed, outlet, line);
     if events.is_file() { session.replay(events) } else { session.live(events) }
 }
 
@@ -148,10 +147,10 @@ fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let keeper = Keeper::new(configurator, None).with_filters(&settings.filters);
     let mut keeper = keeper.with_unrecorded(settings.unrecorded);
     let events = Lines::open(&arguments.events)?;
-    let (journal, recovery) = journal(arguments, common, &mut keeper)?.unzip();
+    let resumed = journal(arguments, common, &mut keeper)?;
     let outlet = Outlet::open(&arguments.outlets, "", None)?;
-    let ready = KeeperReadyLine::new(&keeper, recovery.as_ref());
-    ended(keep_going(common, keeper, journal, &ready, events, &outlet), &outlet)
+    let ready = KeeperReadyLine::new(&keeper, resumed.as_ref().map(|resumed| &resumed.recovery));
+    ended(keep_going(common, keeper, resumed, &ready, events, &outlet), &outlet)
 }
 
 fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Failure> {
@@ -162,7 +161,7 @@ fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Fa
 fn keep_going(
     common: &Common,
     keeper: Keeper,
-    journal: Option<Journal>,
+    resumed: Option<Resumed<KeeperAnswer>>,
     ready: &KeeperReadyLine,
     events: Lines,
     outlet: &Outlet,
@@ -170,7 +169,7 @@ fn keep_going(
     if is_over(outlet.say(&output::line(ready)))? {
         return Ok(());
     }
-    let session = KeeperSession::new(common, keeper, journal, outlet);
+    let session = KeeperSession::new(common, keeper, resumed, outlet);
     if events.is_file() { session.replay(events) } else { session.live(events) }
 }
 

@@ -7,17 +7,19 @@ use std::time::{Duration, Instant};
 
 use crate::configure::{Keeper, KeeperAnswer};
 use crate::journal::Journal;
-use crate::mapek::{Clock as _, Observation, SystemClock};
+use crate::mapek::{Clock as _, Observation, Recoverable as _, SystemClock};
 
 use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};
 use crate::cli::run_outlet::{Outlet, unwritten, warn_if_unrecorded};
-use crate::cli::run_session::{Flow, Input, MAX_WAITING, MIN_PAUSE, flow, read};
+use crate::cli::run_session::{Flow, Input, MAX_WAITING, MIN_PAUSE, Resumed, flow, read};
 
 pub(super) struct KeeperSession<'a> {
     common: &'a Common,
     keeper: Keeper,
     journal: Option<Journal>,
+    /// Answers of the resumed journal, until they are printed.
+    resumed_answers: Vec<KeeperAnswer>,
     outlet: &'a Outlet,
     clock: SystemClock,
     /// Time of the last line or timer event of the resumed journal, since the start; 0 without such an event.
@@ -32,11 +34,25 @@ impl<'a> KeeperSession<'a> {
     pub(super) fn new(
         common: &'a Common,
         keeper: Keeper,
-        journal: Option<Journal>,
+        resumed: Option<Resumed<KeeperAnswer>>,
         outlet: &'a Outlet,
     ) -> Self {
+        let (journal, resumed_answers) = match resumed {
+            None => (None, Vec::new()),
+            Some(Resumed { journal, answers, .. }) => (Some(journal), answers),
+        };
         let (begun, clock) = (keeper.now(), SystemClock::default());
-        Self { common, keeper, journal, outlet, clock, begun, has_times: false, blank_lines: 0 }
+        Self {
+            common,
+            keeper,
+            journal,
+            resumed_answers,
+            outlet,
+            clock,
+            begun,
+            has_times: false,
+            blank_lines: 0,
+        }
     }
 
     /// Answers all lines of a file. Filters that become due between two lines are handled together with the later
@@ -69,14 +85,17 @@ impl<'a> KeeperSession<'a> {
         Ok(())
     }
 
-    /// Makes the first choice of designs. If a journal is resumed, completes unfinished work instead, and
-    /// repeats effects that were not acknowledged.
+    /// Prints the answers of a resumed journal. Makes the first choice of designs if it was not made before.
     fn begin(&mut self) -> Result<Flow, Failure> {
         let read = Instant::now();
-        let answers = match &mut self.journal {
-            None => self.keeper.start(),
-            Some(journal) => journal.begin(&mut self.keeper).map_err(|error| unwritten(&error))?,
-        };
+        let mut answers = std::mem::take(&mut self.resumed_answers);
+        if self.keeper.has_agenda() {
+            let mut choice = self.keeper.start();
+            if let Some(journal) = &mut self.journal {
+                journal.decided(&mut self.keeper, &mut choice).map_err(|error| unwritten(&error))?;
+            }
+            answers.extend(choice);
+        }
         self.warn(&answers);
         flow(self.outlet.answer(self.number(), &answers, read))
     }

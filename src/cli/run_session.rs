@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
-use crate::journal::Journal;
+use crate::journal::{Journal, Recovery};
 use crate::mapek::{Answer, Clock as _, Loop, Observation, ParallelSearch, SystemClock, Thoughts};
 use crate::message::Message;
 
@@ -44,10 +44,20 @@ pub(super) enum Flow {
     Over,
 }
 
+/// A journal that is open for writing, after the reaction to an event without a recorded reaction.
+pub(super) struct Resumed<A> {
+    pub(super) journal: Journal,
+    pub(super) recovery: Recovery,
+    /// Answers of that reaction, and effects that were not acknowledged.
+    pub(super) answers: Vec<A>,
+}
+
 pub(super) struct Session<'a> {
     common: &'a Common,
     control: Loop,
     journal: Option<Journal>,
+    /// Answers of the resumed journal, until they are printed.
+    resumed_answers: Vec<Answer>,
     outlet: &'a Outlet,
     clock: SystemClock,
     /// Time of the last line or timer event of the resumed journal, since the start of the mission; 0 without
@@ -68,16 +78,21 @@ impl<'a> Session<'a> {
     pub(super) fn new(
         common: &'a Common,
         control: Loop,
-        journal: Option<Journal>,
+        resumed: Option<Resumed<Answer>>,
         outlet: &'a Outlet,
         line: Arc<AtomicU64>,
     ) -> Self {
+        let (journal, resumed_answers) = match resumed {
+            None => (None, Vec::new()),
+            Some(Resumed { journal, answers, .. }) => (Some(journal), answers),
+        };
         let begun = control.beliefs().now();
         let clock = SystemClock::default();
         Self {
             common,
             control,
             journal,
+            resumed_answers,
             outlet,
             clock,
             begun,
@@ -105,10 +120,7 @@ impl<'a> Session<'a> {
         let (sender, inputs) = sync_channel(MAX_WAITING);
         read(events, self.common.clone(), sender.clone());
         let read = Instant::now();
-        let answers = match &mut self.journal {
-            None => Vec::new(),
-            Some(journal) => journal.begin_reacting(&mut self.control).map_err(|error| unwritten(&error))?,
-        };
+        let answers = std::mem::take(&mut self.resumed_answers);
         self.open = Some((self.number(), read));
         let mut flow = self.say(&answers)?;
         let (mut waiting, mut is_ended) = (VecDeque::new(), false);
@@ -150,13 +162,15 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Makes the first decision. If a journal is resumed, completes unfinished work instead, and repeats
-    /// effects that were not acknowledged.
+    /// Prints the answers of a resumed journal. Makes the first decision, or the decision that the previous process
+    /// left open.
     fn begin(&mut self, read: Instant) -> Result<Flow, Failure> {
-        let answers = match &mut self.journal {
-            None => self.control.start(),
-            Some(journal) => journal.begin(&mut self.control).map_err(|error| unwritten(&error))?,
-        };
+        let mut answers = std::mem::take(&mut self.resumed_answers);
+        if self.control.has_agenda() {
+            let mut decision = self.control.deliberate();
+            self.decided(&mut decision)?;
+            answers.extend(decision);
+        }
         let number = self.number();
         self.answer(number, &answers, read)
     }

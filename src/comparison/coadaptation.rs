@@ -3,17 +3,17 @@
 //! configuration.
 //!
 //! The PDDL symbols have default names; the section `[probabilistic]` of a manifest can give other names.
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 use ontology::tomasys::View;
-use pddl::ast::{Atom, Condition, InitialElement, Problem, Term};
+use pddl::ast::{Atom, Condition, Domain, InitialElement, Name, Problem, Term};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::message::{Errors, Message};
+use crate::message::{Errors, Message, did_you_mean};
 use crate::mission::Mission;
 
 /// The PDDL symbols and the parameters of the co-adaptation process; the section `[probabilistic]` of a manifest.
@@ -76,6 +76,77 @@ impl Default for Roles {
             loss_component: None,
             loss_rate: 0.0,
         }
+    }
+}
+
+impl Roles {
+    /// Returns the faults of these settings for a mission, each with the key of the faulty value. The domain may lack
+    /// symbols with default names, because the process does not need all of them.
+    pub fn mistakes(&self, mission: &Mission) -> Vec<(&'static str, Message)> {
+        let mut mistakes = self.unknown_symbols(mission.domain());
+        if self.battery_unit == 0 {
+            let text = "`battery_unit` is 0, but should be at least 1";
+            mistakes.push(("battery_unit", Message::error("M105", text)));
+        }
+        if let Some(component) = &self.loss_component {
+            let designs = mission.knowledge().map(|knowledge| knowledge.view().function_designs());
+            let designs = designs.unwrap_or_default();
+            let components = designs.iter().flat_map(|design| &design.components);
+            let required: BTreeSet<&str> = components.map(|component| component.name.as_str()).collect();
+            if !required.contains(component.as_str()) {
+                let names: Vec<&str> = required.into_iter().collect();
+                let suggestion = did_you_mean(component, names.iter().copied());
+                let text = format!(
+                    "no design requires a component `{component}` that could be lost; designs require: {}{suggestion}",
+                    names.join(", ")
+                );
+                mistakes.push(("loss_component", Message::error("M125", text)));
+            }
+        }
+        if !(0.0..=1.0).contains(&self.loss_rate) {
+            let text = format!("`loss_rate` is {}, but should be a probability, from 0 to 1", self.loss_rate);
+            mistakes.push(("loss_rate", Message::error("M105", text)));
+        }
+        mistakes
+    }
+
+    /// Returns an error for each symbol that is not the default and that the domain does not declare.
+    fn unknown_symbols(&self, domain: &Domain) -> Vec<(&'static str, Message)> {
+        let default = Self::default();
+        let predicates = [
+            ("location", &self.location, &default.location),
+            ("configured", &self.configured, &default.configured),
+            ("available", &self.available, &default.available),
+            ("suits", &self.suits, &default.suits),
+        ];
+        let functions = [
+            ("time", &self.time, &default.time),
+            ("energy", &self.energy, &default.energy),
+            ("success", &self.success, &default.success),
+            ("hit", &self.hit, &default.hit),
+            ("switch_time", &self.switch_time, &default.switch_time),
+            ("switch_energy", &self.switch_energy, &default.switch_energy),
+            ("switch_success", &self.switch_success, &default.switch_success),
+            ("battery", &self.battery, &default.battery),
+            ("reserve", &self.reserve, &default.reserve),
+        ];
+        let mut mistakes = Vec::new();
+        for (noun, symbols, declarations) in [
+            ("predicate", &predicates[..], &domain.predicates),
+            ("function", &functions[..], &domain.functions),
+        ] {
+            let names: Vec<&Name> = declarations.iter().map(|declared| &declared.identifier.name).collect();
+            for (key, symbol, _) in symbols.iter().filter(|(_, symbol, default)| symbol != default) {
+                if !names.contains(&&Name::new(symbol)) {
+                    let suggestion = did_you_mean(symbol, names.iter().map(|name| name.as_str()));
+                    let text = format!(
+                        "`{key}` is `{symbol}`, but the domain has no {noun} of this name{suggestion}"
+                    );
+                    mistakes.push((*key, Message::error("M105", text)));
+                }
+            }
+        }
+        mistakes
     }
 }
 

@@ -120,9 +120,12 @@ impl JournalFiles {
 
     /// Returns the segments from the given number to the last one, or a description of the first
     /// fault. Each segment has to continue the record chain of its predecessor, and the last one must not end with an
-    /// `end` record.
+    /// `end` record. A sound snapshot requires the segment with its number.
     pub(super) fn chain(&self, from: u64) -> Result<Vec<&Segment>, String> {
-        let last = self.segments.keys().chain(self.snapshots.keys()).max().copied().unwrap_or(from);
+        // A checkpoint writes its snapshot after the `end` record that refers to the new segment. So without this
+        // record, a faulty snapshot after the last segment, such as a foreign file, proves no missing segment.
+        let sound = self.snapshots.iter().filter(|(_, snapshot)| snapshot.is_ok()).map(|(number, _)| number);
+        let last = self.segments.keys().chain(sound).max().copied().unwrap_or(from);
         let mut chain: Vec<&Segment> = Vec::new();
         for number in from..=last.max(from) {
             let name = name("journal", number);

@@ -396,7 +396,7 @@ impl Journal {
             let name = entry?.file_name();
             let part = name.to_str().and_then(|name| name.split_once('-'));
             let is_old = part.is_some_and(|(kind, number)| {
-                ["journal", "snapshot"].contains(&kind) && number.parse().is_ok_and(|n: u64| n + 1 < next)
+                ["journal", "snapshot"].contains(&kind) && number.parse().is_ok_and(|n: u64| n < next - 1)
             });
             if is_old {
                 // A failure is harmless, because no later segment depends on the file.

@@ -1,7 +1,6 @@
 //! Monitor (of MAPE-K): applies events reported by the managed system to the beliefs.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
-use std::sync::Arc;
 
 use num_rational::BigRational;
 use ontology::vocab::local_name;
@@ -348,17 +347,19 @@ impl BeliefUpdate<'_> {
 
     /// Returns the effects of a complete execution of the action under way, regardless of its conditions. They are those
     /// in the state before the action: without the increases and decreases by its progress.
-    fn advance(&self) -> Option<Advance> {
-        let (mission, running) = (&self.beliefs.mission, self.beliefs.running.as_ref()?);
-        let mut problem = self.beliefs.filled();
-        if !running.applied.is_empty() {
-            let mut before = Arc::unwrap_or_clone(problem);
-            for (name, change) in &running.applied {
-                Mission::add_to_value(&mut before, name, &-change);
-            }
-            problem = Arc::new(before);
+    fn advance(&mut self) -> Option<Advance> {
+        let Beliefs { mission, running, .. } = &mut *self.beliefs;
+        let running = running.as_ref()?;
+        let step = running.step.to_plan_step();
+        if running.applied.is_empty() {
+            return advance(mission.domain(), &mission.current(), &step, true).ok();
         }
-        advance(mission.domain(), &problem, &running.step.to_plan_step(), true).ok()
+        // The caller changes the values of the mission, so that the cached problem becomes outdated anyway.
+        let mut before = mission.take_current();
+        for (name, change) in &running.applied {
+            Mission::add_to_value(&mut before, name, &-change);
+        }
+        advance(mission.domain(), &before, &step, true).ok()
     }
 
     fn fact(&mut self, name: &str, value: &str) -> Result<(), Refusal> {

@@ -46,6 +46,14 @@ pub enum Positions {
 }
 
 impl ReportSection {
+    /// Returns the path of the file with positions, if the section names one.
+    pub fn file(&self, origin: &ManifestPath) -> Option<PathBuf> {
+        match &self.positions {
+            Some(Written::File(file)) => Some(origin.path(file)),
+            _ => None,
+        }
+    }
+
     /// Reads the coordinates of places.
     ///
     /// # Errors

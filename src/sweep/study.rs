@@ -127,8 +127,8 @@ pub struct Study {
     /// Directory of the study's file, which is the working directory of the runs.
     pub directory: PathBuf,
     /// Checksum of the study's command, generator, time limit and values, of the files whose paths are words of
-    /// the command, and of the program's version. It does not cover the files that these files name, such as the
-    /// knowledge base of a mission, nor files whose paths contain a placeholder.
+    /// the command, of all files of missions among them, and of the program's version. It does not cover the imports of
+    /// a knowledge base that the command names itself, nor files whose paths contain a placeholder.
     pub digest: String,
     /// Varied keys with their values. The value of the last key changes from each run to the next.
     keys: Vec<(String, Vec<Value>)>,
@@ -464,7 +464,12 @@ fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) 
     part(format!("{:?} {:?} {:?}", sections.command, sections.time_limit, sections.generate).as_bytes());
     part(json!(keys).to_string().as_bytes());
     for word in &sections.command {
-        if let Ok(bytes) = std::fs::read(directory.join(word)) {
+        let path = directory.join(word);
+        let Ok(bytes) = std::fs::read(&path) else { continue };
+        part(&bytes);
+        // Only manifests of missions can be read as such.
+        let Ok(setup) = Setup::read(&path) else { continue };
+        for bytes in setup.files().iter().filter_map(|file| std::fs::read(file).ok()) {
             part(&bytes);
         }
     }

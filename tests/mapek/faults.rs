@@ -248,6 +248,51 @@ fn an_unfinished_snapshot_loses_nothing() {
     }
 }
 
+#[test]
+fn a_foreign_file_with_the_name_of_a_later_snapshot_is_ignored() {
+    let suite = Suite::new();
+    let last = |kind: &str| suite.files.keys().rfind(|name| name.starts_with(kind)).expect("a file").clone();
+    let (segment, snapshot) = (last("journal"), last("snapshot"));
+    for number in ["000099", "18446744073709551615"] {
+        let name = format!("snapshot-{number}");
+        // The copy of a snapshot has another number in its header than in its name.
+        for content in [b"a text".to_vec(), suite.files[&snapshot].clone()] {
+            let mut files = suite.files.clone();
+            files.insert(name.clone(), content);
+            assert!(open(&files, &suite.pristine) == suite.sound, "{name}");
+
+            let directory = temporary_directory();
+            for (name, bytes) in &files {
+                std::fs::write(directory.path().join(name), bytes).expect("a file");
+            }
+            let mut control = suite.pristine.clone();
+            let (mut journal, recovery) =
+                Journal::open(directory.path(), POLICY, &mut control).expect("it opens");
+            let is_reported = recovery.warnings.iter().any(|warning| warning.message.contains(&name));
+            assert!(is_reported, "{:?}", recovery.warnings);
+            journal.begin(&mut control).expect("written");
+            // The next checkpoint removes old files, but not this one.
+            for _ in 0..POLICY.snapshot_every {
+                journal.handle(&mut control, r#"{"event":"tick"}"#, Duration::ZERO).expect("written");
+            }
+            assert!(
+                directory.path().join(&name).exists() && !directory.path().join("journal-000001").exists()
+            );
+
+            files.remove(&segment);
+            assert_eq!(open(&files, &suite.pristine), Outcome::Refused, "the last segment is missing");
+        }
+    }
+    // A sound snapshot proves that its segment is missing, even without the `end` record of the segment before.
+    let mut files = suite.files.clone();
+    files.remove(&segment);
+    let before = files.keys().rfind(|name| name.starts_with("journal")).expect("a file").clone();
+    let bytes = files[&before].clone();
+    let end = bytes.split_inclusive(|byte| *byte == b'\n').next_back().expect("a line").len();
+    files.insert(before, bytes[..bytes.len() - end].to_vec());
+    assert_eq!(open(&files, &suite.pristine), Outcome::Refused);
+}
+
 fn refused(directory: &Path, control: &Loop, words: &str) {
     let refused = Journal::open(directory, POLICY, &mut control.clone());
     let message = refused.map(|(journal, _)| journal).expect_err("it is refused").message.clone();

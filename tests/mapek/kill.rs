@@ -8,7 +8,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use metaplan::journal::Journal;
+use metaplan::journal::{Journal, JournalReport};
 use serde_json::Value;
 
 use crate::common::control;
@@ -198,6 +198,34 @@ fn a_program_killed_at_random_points_recovers() {
 #[ignore = "takes a minute or two"]
 fn a_program_killed_at_five_hundred_points_recovers() {
     check(12, 500);
+}
+
+#[test]
+fn a_recorded_event_without_a_decision_is_counted_and_decided_once() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut control = control("ugv");
+    let (mut journal, _) = Journal::open(directory.path(), POLICY, &mut control).expect("the journal opens");
+    journal.begin(&mut control).expect("written");
+    // The process ends between the record of the event and the record of the reaction.
+    let event = r#"{"event":"fact_changed","name":"battery","value":99.1}"#;
+    journal.observe(&mut control, event, Duration::ZERO).expect("written");
+    drop(journal);
+
+    let mut program = Program::start("ugv", directory.path());
+    let ready = program.lines.recv().expect("a first line");
+    assert_eq!(ready["lines"], 1, "{ready}");
+    let handled = |program: &Program| program.lines.iter().find(|answer| answer["answer"] == "handled");
+    assert_eq!(handled(&program).expect("an answer")["line"], 1);
+    writeln!(program.stdin, r#"{{"event":"tick"}}"#).expect("it listens");
+    assert_eq!(handled(&program).expect("an answer")["line"], 2);
+    drop(program.stdin);
+    assert!(program.child.wait().expect("it ends").success());
+
+    let entries = JournalReport::read(directory.path()).expect("a journal").entries;
+    let positions: Vec<usize> = (0..entries.len()).filter(|&index| entries[index].content == event).collect();
+    let [position] = positions[..] else { panic!("{entries:#?}") };
+    let next = &entries[position + 1];
+    assert!(["reaction", "decision"].contains(&next.kind.as_str()), "{next:?}");
 }
 
 #[test]

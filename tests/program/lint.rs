@@ -52,6 +52,16 @@ fn templates_and_shipped_missions_are_clean() {
 }
 
 #[test]
+fn mistakes_in_the_section_probabilistic_are_errors() {
+    let section = "[probabilistic]\nlocation = \"nowhere\"\nbattery_unit = 0\nloss_component = \"c_lidr\"\n\
+                   loss_rate = -0.1\n\n[planning]\n";
+    let words =
+        ["`location` is `nowhere`", "`battery_unit` is 0", "did you mean `c_lidar`?", "`loss_rate` is -0.1"];
+    let outcome = check(&[("mission.toml", "[planning]\n", section)], 3, &words);
+    assert!(outcome.stdout.contains("4 errors, 0 warnings"), "{outcome:#?}");
+}
+
+#[test]
 fn unused_names_are_warnings() {
     check(
         &[("robot.ttl", ":a_pick a t:Action", ":a_pickup a t:Action")],

@@ -57,6 +57,21 @@ fn invalid_sections_are_refused_by_all_commands() {
         "10:13: error[M104]: invalid type: string \"often\", expected f64",
     );
     check(
+        "[probabilistic]\nlocation = \"robot_att\"\nbattery_unit = 0\nloss_component = \"c_kinetc\"\nloss_rate = 2",
+        "10:12: error[M105]: `location` is `robot_att`, but the domain has no predicate of this name; \
+         did you mean `robot_at`?\n\
+         m.toml:11:16: error[M105]: `battery_unit` is 0, but should be at least 1\n\
+         m.toml:12:18: error[M125]: no design requires a component `c_kinetc` that could be lost; designs require: \
+         c_camera, c_flashlight, c_kinect, c_lidar; did you mean `c_kinect`?\n\
+         m.toml:13:13: error[M105]: `loss_rate` is 2, but should be a probability, from 0 to 1",
+    );
+    check(
+        "[probabilistic]\ntime = \"travel_tme\"\nloss_rate = nan",
+        "10:8: error[M105]: `time` is `travel_tme`, but the domain has no function of this name; \
+         did you mean `travel_time`?\n\
+         m.toml:11:13: error[M105]: `loss_rate` is NaN, but should be a probability, from 0 to 1",
+    );
+    check(
         "[scenarios.s]\nfial = []",
         "10:1: error[M104]: unknown field `fial`, expected one of `description`, `fail`, `set`, `simulation`; \
          did you mean `fail`?",

@@ -7,9 +7,10 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use metaplan::schemas::schema;
+use metaplan::sweep::Study;
 use serde_json::Value;
 
-use crate::common::{metaplan, root};
+use crate::common::{edit, metaplan, metaplan_in, root};
 
 const STUDY: &str = "missions/studies/kinect.toml";
 
@@ -119,6 +120,40 @@ fn results_of_different_studies_are_not_mixed() {
         damaged_results.status == 3 && damaged_results.stdout.contains("line 2 is damaged"),
         "{damaged_results:#?}"
     );
+}
+
+#[test]
+fn a_study_changes_with_every_file_of_its_mission() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let here = folder.path();
+    assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
+    let mission = here.join("m");
+    let files = "files = [\"robot.ttl\"]";
+    edit(&mission, "mission.toml", files, &format!("{files}\nrules = [\"coadaptation\", \"own.swrl\"]"));
+    let import = "owl:imports <http://metacontrol.org/tomasys>";
+    edit(&mission, "robot.ttl", import, &format!("{import} , <more.ttl>"));
+    let more =
+        "@prefix owl: <http://www.w3.org/2002/07/owl#> .\n<http://example.org/more> a owl:Ontology .\n";
+    fs::write(mission.join("more.ttl"), more).expect("written");
+    let rule = "@prefix t: <http://metacontrol.org/tomasys#> .\n@prefix w: <http://example.org/warehouse#> .\n\
+                [own] t:requiresC(?fd, w:c_lidar) -> t:fd_realisability(?fd, false) .\n";
+    fs::write(mission.join("own.swrl"), rule).expect("written");
+    let study = here.join("study.toml");
+    fs::write(&study, "command = ['plan', 'm/mission.toml']\n").expect("written");
+    let digest = || Study::read(&study).expect("a study").digest;
+    let before = digest();
+    for file in
+        ["mission.toml", "domain.pddl", "problem.pddl", "robot.ttl", "more.ttl", "own.swrl", "places.csv"]
+    {
+        let path = mission.join(file);
+        let text = fs::read_to_string(&path).expect("text");
+        fs::write(&path, text.clone() + "\n").expect("written");
+        assert_ne!(digest(), before, "{file}");
+        fs::write(&path, text).expect("written");
+        assert_eq!(digest(), before, "{file}");
+    }
+    fs::write(mission.join("notes.txt"), "no part of the mission").expect("written");
+    assert_eq!(digest(), before);
 }
 
 #[test]

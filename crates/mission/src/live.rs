@@ -42,6 +42,13 @@ impl Mission {
         Arc::clone(self.current.get_or_init(fill))
     }
 
+    /// Returns the problem of [`Mission::current`], and empties its cache. Copies the problem only if it is shared.
+    pub fn take_current(&mut self) -> Problem {
+        let filled = self.current();
+        self.current.take();
+        Arc::unwrap_or_clone(filled)
+    }
+
     /// Returns `true` if a numeric function of a plain domain (without a type of designs) is
     /// replaced by a sum over the chosen or the newly chosen designs.
     pub(crate) fn stands_for_designs(&self, function: &Name) -> bool {
