@@ -121,10 +121,15 @@ pub fn compile<'t>(
     }
     let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     if has_events && !used_preferences.is_empty() && matches!(course, PlanSemantics::Sequence) {
+        let uses = |metric: &Metric| !preferences_in(std::slice::from_ref(metric)).is_empty();
+        let place = match (0..).zip(objectives).find(|(_, metric)| uses(metric)) {
+            Some((index, metric)) => (File::Objective(index), metric.span),
+            None => (File::Problem, problem.metric.as_ref().map_or(problem.name.span, |metric| metric.span)),
+        };
         errors.push(unsupported(
             "a preference together with timed initial literals",
             "`--concurrent`, or preferences without timed initial literals",
-            (File::Problem, problem.metric.as_ref().map_or(problem.name.span, |metric| metric.span)),
+            place,
         ));
     }
     limits.check().map_err(|interrupted| vec![interrupted.into()])?;
