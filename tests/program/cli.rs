@@ -334,7 +334,11 @@ fn numbers_of_any_size_are_supported() {
     // Options that need SAT formulas are refused.
     let directory = tempfile::tempdir().expect("a directory");
     let certificate = directory.path().join("certificate").display().to_string();
-    check(&plan(domain, problem, &["--certificate", &certificate]), 3, &["M120", "multiplied by fractions"]);
+    check(
+        &plan(domain, problem, &["--certificate", &certificate]),
+        3,
+        &["M120", "`halve` multiplies a number by a fraction"],
+    );
     for (options, omitted) in [
         (&["--alternatives", "3"][..], "`--alternatives`"),
         (&["--engine", "sat"], "`--engine sat`"),
