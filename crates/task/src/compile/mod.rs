@@ -121,9 +121,10 @@ pub fn compile<'t>(
     }
     let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     if has_events && !used_preferences.is_empty() && matches!(course, PlanSemantics::Sequence) {
-        let uses = |metric: &Metric| !preferences_in(std::slice::from_ref(metric)).is_empty();
-        let place = match (0..).zip(objectives).find(|(_, metric)| uses(metric)) {
-            Some((index, metric)) => (File::Objective(index), metric.span),
+        let objective =
+            objectives.iter().position(|metric| !preferences_in(std::slice::from_ref(metric)).is_empty());
+        let place = match objective {
+            Some(index) => (File::Objective(index), objectives[index].span),
             None => (File::Problem, problem.metric.as_ref().map_or(problem.name.span, |metric| metric.span)),
         };
         errors.push(unsupported(
