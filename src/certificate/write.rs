@@ -9,7 +9,8 @@ use num_rational::BigRational;
 use pddl::ast::Problem;
 use pddl::{print_domain, print_problem};
 use planner::{
-    Certificate, ExactTask, Limits, RefutationOutputs, Solution, Status, Task, certify, certify_exact, refute,
+    Certificate, ExactTask, Limits, NoCertificate, RefutationOutputs, Solution, Task, certify, certify_exact,
+    refute,
 };
 use serde::Serialize;
 
@@ -40,7 +41,7 @@ pub enum Ground<'c> {
 }
 
 impl Ground<'_> {
-    fn certify(self, solution: &Solution, limits: &Limits) -> Option<Certificate> {
+    fn certify(self, solution: &Solution, limits: &Limits) -> Result<Certificate, NoCertificate> {
         match self {
             Self::Integers(task) => certify(task, solution, limits),
             Self::Exact(task) => certify_exact(task, solution, limits),
@@ -101,16 +102,7 @@ pub(super) fn write_with(
     let Contents { mission, problem, task, solution, plan } = *contents;
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
     let name = directory.display().to_string();
-    let Some(certificate) = task.certify(solution, limits) else {
-        let reason = match solution.status {
-            Status::Optimal | Status::Unsolvable => {
-                "the proof is not of a kind that certificates can express: several objectives, actions that improve the \
-                 metric, numbers that are multiplied by fractions, or a search that does not end within the limits"
-            }
-            _ => "nothing is proved for plans of any length",
-        };
-        return Err(Message::error("M120", format!("no certificate: {reason}")));
-    };
+    let certificate = task.certify(solution, limits).map_err(|reason| wrong(&reason))?;
     let (domain_text, problem_text) = (print_domain(mission.domain()), print_problem(problem));
     let witness = compared((&domain_text, &problem_text), &certificate.task, limits)
         .map_err(|reason| wrong(&reason))?;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use crate::answers::ConfigureAnswer;
 use crate::configure::{Choice, Configuration, Configurator, Goal, Verdict, Wishes, Worth};
 use crate::knowledge::Knowledge;
-use crate::message::Message;
+use crate::message::{Message, did_you_mean};
 use clap::Args;
 use num_rational::BigRational;
 
@@ -49,7 +49,9 @@ pub(super) struct Wanted {
     /// functions if it has none.
     #[arg(long = "objective", value_name = "FUNCTION")]
     objectives: Vec<String>,
-    /// Bound on an attribute of the design for a function, as in a requirement of an objective (repeatable).
+    /// Prefer designs for FUNCTION whose estimation of ATTRIBUTE satisfies a bound (repeatable). The rules of the
+    /// knowledge base state whether BOUND is the least or the greatest value. If `--objective` is used or the
+    /// knowledge base has objectives, this requires `--objective FUNCTION`.
     #[arg(long = "require", value_name = "FUNCTION.ATTRIBUTE=BOUND", value_parser = requirement)]
     requirements: Vec<(String, String, BigRational)>,
     /// Upper limit on the sum of an attribute's estimations over all chosen designs (repeatable).
@@ -67,10 +69,12 @@ pub(super) struct Wanted {
 }
 
 fn requirement(text: &str) -> Result<(String, String, BigRational), String> {
-    let wrong = || format!("`{text}` is not of the form FUNCTION.ATTRIBUTE=BOUND");
-    let (name, bound) = amount(text).map_err(|_| wrong())?;
+    let wrong =
+        || format!("`{text}` is not of the form FUNCTION.ATTRIBUTE=BOUND, such as `f_move.safety=0.5`");
+    let (name, _) = text.split_once('=').ok_or_else(wrong)?;
     let (function, attribute) = name.split_once('.').ok_or_else(wrong)?;
-    Ok((function.to_owned(), attribute.to_owned(), bound))
+    let (_, bound) = amount(text)?;
+    Ok((function.trim().to_owned(), attribute.trim().to_owned(), bound))
 }
 
 impl Wanted {
@@ -107,20 +111,9 @@ impl Wanted {
         } else {
             self.objectives.clone()
         };
-        for (function, ..) in &self.requirements {
+        for (function, attribute, _) in &self.requirements {
             if !functions.contains(function) {
-                let text = if functions.is_empty() {
-                    format!(
-                        "`--require {function}.…` needs `--objective {function}`; objectives of the knowledge base have \
-                         the requirements that it states"
-                    )
-                } else {
-                    format!(
-                        "`--require {function}.…` does not name an objective; there are: {}",
-                        functions.join(", ")
-                    )
-                };
-                wrong.push(Message::error("M107", text));
+                wrong.push(self.without_objective((function.as_str(), attribute.as_str()), &configurator));
             }
         }
         for function in &functions {
@@ -134,6 +127,27 @@ impl Wanted {
         } else {
             Err(Failure { exit: Exit::Usage, messages: wrong.into() })
         }
+    }
+
+    /// Returns the message that `--require` names a function for which no objective is added.
+    fn without_objective(&self, (function, attribute): (&str, &str), configurator: &Configurator) -> Message {
+        let functions = configurator.functions();
+        if !functions.iter().any(|existing| existing == function) {
+            let suggestion = did_you_mean(function, functions.iter().map(String::as_str));
+            let text = format!(
+                "`--require {function}.{attribute}`: the knowledge base has no function `{function}` that a design \
+                 solves; it has: {}{suggestion}",
+                functions.join(", ")
+            );
+            return Message::error("M140", text);
+        }
+        let reason = if self.objectives.is_empty() {
+            "the objectives of the knowledge base have only the requirements that it states".to_owned()
+        } else {
+            format!("the functions of `--objective` are: {}", self.objectives.join(", "))
+        };
+        let text = format!("`--require {function}.{attribute}` needs `--objective {function}`: {reason}");
+        Message::error("M107", text).with_help(format!("add `--objective {function}`"))
     }
 }
 

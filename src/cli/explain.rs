@@ -40,7 +40,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(name) = arguments.mission.to_str().filter(|name| codes::is_code(name))
         && !arguments.mission.exists()
     {
-        return code(name, common);
+        return code(name, arguments, common);
     }
     let guard = arguments.time.guard(common)?;
     let mission = arguments.situation.mission(std::slice::from_ref(&arguments.mission), common)?;
@@ -103,13 +103,21 @@ fn planning<T>(
     outcome.map_err(|messages| Failure::planning(messages, limits))
 }
 
-fn code(name: &str, common: &Common) -> Result<Exit, Failure> {
+fn code(name: &str, arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let Some(found) = codes::find(name) else {
         let catalogue = codes::all();
         let suggestion = did_you_mean(name, catalogue.iter().map(|code| code.code));
         let text = format!("there is no code `{name}`, and no file of that name{suggestion}");
         return Err(Failure::usage(Message::error("M138", text)));
     };
+    if arguments.query.is_some() || !arguments.situation.is_empty() {
+        let text = format!(
+            "a code has neither a design nor a situation; use `metaplan explain {}` alone, or give a mission instead \
+             of the code",
+            found.code
+        );
+        return Err(Failure::usage(Message::error("M107", text)));
+    }
     if common.format == Format::Json {
         output::json_answer(&CodeAnswer::from(found));
     } else {

@@ -26,9 +26,9 @@ pub struct Arguments {
     /// Output format.
     #[arg(long = "to", value_enum, value_name = "FORMAT")]
     target: Language,
-    /// Variant of the probabilistic approach to export.
-    #[arg(long, value_enum, default_value_t = Setting::Corrected)]
-    setting: Setting,
+    /// With `--to prism` or `--to jani`: variant of the probabilistic approach to export. Default: `corrected`.
+    #[arg(long, value_enum)]
+    setting: Option<Setting>,
     #[command(flatten)]
     situation: Situation,
     #[command(flatten)]
@@ -50,7 +50,7 @@ enum Language {
     Jani,
 }
 
-/// Abstraction level of an exported model.
+/// Variant of an exported model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Setting {
     /// All routes, reconfiguration in every place, collisions are part of the state, and the battery limits moves.
@@ -62,6 +62,11 @@ enum Setting {
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
+    if matches!(arguments.target, Language::Pddl) && arguments.setting.is_some() {
+        let text = "`--setting` selects a variant of the probabilistic model, which `--to pddl` does not export; \
+                    omit it, or use `--to prism` or `--to jani`";
+        return Err(Failure::usage(Message::error("M107", text)));
+    }
     let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs, common)?;
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
@@ -99,8 +104,8 @@ fn process(
         }
     })?;
     let model = match arguments.setting {
-        Setting::Corrected => program(&coadaptation, Risk::all(&coadaptation)),
-        Setting::Published => published_program(&coadaptation),
+        None | Some(Setting::Corrected) => program(&coadaptation, Risk::all(&coadaptation)),
+        Some(Setting::Published) => published_program(&coadaptation),
     };
     let text = match arguments.target {
         Language::Jani => match probabilistic::jani::write(&mission.name, &model) {

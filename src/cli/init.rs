@@ -1,7 +1,7 @@
 //! The command `metaplan init`, which creates a directory with a small mission.
 
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, is_separator};
 
 use crate::answers::InitAnswer;
 use crate::message::Message;
@@ -58,10 +58,17 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         output::json_answer(&InitAnswer::new(&path, template.name(), files));
     } else {
         let manifest = directory.join(MANIFEST);
-        let next = format!("metaplan plan {}", manifest.display());
+        let next = format!("metaplan plan {}", shell_word(&manifest.display().to_string()));
         output::answer(&format!("{path}: {}\nnext: {next}\n", files.join(", ")));
     }
     Ok(Exit::Done)
+}
+
+/// Returns a path as an argument in the command line of a POSIX shell: in quotes if necessary, and without a leading `-`.
+fn shell_word(path: &str) -> String {
+    let path = if path.starts_with('-') { format!("./{path}") } else { path.to_owned() };
+    let is_plain = |c: char| c.is_alphanumeric() || "_-.,:+@%=".contains(c) || is_separator(c);
+    if path.chars().all(is_plain) { path } else { format!("'{}'", path.replace('\'', r"'\''")) }
 }
 
 fn refused(directory: &Path, shown: &str, error: ErrorKind) -> Message {

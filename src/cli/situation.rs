@@ -79,6 +79,20 @@ impl Situation {
         Self { knowledge, rules, imports, names, scenario, set, fail }
     }
 
+    /// Returns `true` if none of these options is used.
+    pub(super) fn is_empty(&self) -> bool {
+        !self.adds_knowledge() && self.before().is_none()
+    }
+
+    /// Returns `true` if an option is used for which a mission's manifest has a key.
+    fn adds_knowledge(&self) -> bool {
+        let Self { knowledge, rules, imports, names, .. } = self;
+        let Imports { catalog, directory, ignore_missing_imports } = imports;
+        let has_no_files = knowledge.is_empty() && rules.is_empty() && names.is_empty();
+        let is_unused = has_no_files && catalog.is_empty() && directory.is_empty();
+        !is_unused || *ignore_missing_imports
+    }
+
     /// Returns these options without scenario, set values and failed components. Returns `None` if
     /// they contain no such changes.
     pub(super) fn before(&self) -> Option<Self> {
@@ -113,10 +127,7 @@ impl Situation {
     fn read(&self, inputs: &[PathBuf]) -> Result<Setup, Failure> {
         let mut setup = match inputs {
             [manifest] => {
-                let imports = &self.imports;
-                let is_empty = self.knowledge.is_empty() && self.rules.is_empty() && self.names.is_empty();
-                let here = imports.catalog.is_empty() && imports.directory.is_empty();
-                if !(is_empty && here && !imports.ignore_missing_imports) {
+                if self.adds_knowledge() {
                     let text = "`--kb`, `--rules`, `--name` and the options for imports require DOMAIN and \
                                 PROBLEM; the manifest of a mission has keys for them";
                     return Err(Failure::usage(Message::error("M107", text)));

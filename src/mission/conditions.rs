@@ -52,8 +52,8 @@ pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     let mut problem = mission.problem().clone();
     mission.fill(&mut problem);
     let before = usize::from(!text.trim_start().starts_with('('));
-    let metric = mission.objective(&problem, text).map_err(|errors| faults(errors, text, before))?;
-    if let Expression::Fluent(atom) = metric.expression {
+    let objective = mission.objective(&problem, text).map_err(|errors| faults(errors, text, before))?;
+    if let Expression::Fluent(atom) = objective.metric.expression {
         return Ok(atom);
     }
     let text = format!("`{text}` is not one numeric function with its arguments, such as `(battery)`");

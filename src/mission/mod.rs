@@ -13,7 +13,7 @@ mod plansys2;
 mod sections;
 mod steps;
 
-pub use ::mission::{Bindings, CoAdaptation, Mission, Names, unused_measurement};
+pub use ::mission::{Bindings, CoAdaptation, Mission, Names, ParsedObjective, unused_measurement};
 pub use blocking::{Blocking, blocking};
 pub use btcpp::btcpp_text;
 pub use confirm::{Reading, Unconfirmed, confirm};

@@ -3,11 +3,11 @@
 use std::borrow::Cow;
 
 use num_rational::BigRational;
-use pddl::ast::{Domain, Metric, Name, Problem};
+use pddl::ast::{Domain, Name, Problem};
 use pddl::{Diagnostic, Severity};
 use planner::{ConcurrentTask, ExactTask, GroundConfig, Limits, Plan, Replanner, Task};
 
-use ::mission::Mission;
+use ::mission::{Mission, ParsedObjective};
 
 use crate::message::{Errors, Message};
 use crate::narrow::narrowed;
@@ -24,7 +24,12 @@ pub trait Planning {
     ///
     /// # Errors
     /// Constructs or numbers that the planner does not support, or a limit that was reached.
-    fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits) -> Result<Task, Errors>;
+    fn ground(
+        &self,
+        problem: &Problem,
+        objectives: &[ParsedObjective],
+        limits: &Limits,
+    ) -> Result<Task, Errors>;
 
     /// Grounds a problem as [`Planning::ground`] does, but with exact rationals, so that numbers of
     /// any size are accepted.
@@ -34,7 +39,7 @@ pub trait Planning {
     fn ground_exact(
         &self,
         problem: &Problem,
-        objectives: &[Metric],
+        objectives: &[ParsedObjective],
         limits: &Limits,
     ) -> Result<ExactTask, Errors>;
 
@@ -46,7 +51,7 @@ pub trait Planning {
     fn ground_concurrent(
         &self,
         problem: &Problem,
-        objectives: &[Metric],
+        objectives: &[ParsedObjective],
         separation: &BigRational,
         limits: &Limits,
     ) -> Result<ConcurrentTask, Errors>;
@@ -63,31 +68,36 @@ impl Planning for Mission {
         narrowed(self, self.domain(), problem)
     }
 
-    fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits) -> Result<Task, Errors> {
+    fn ground(
+        &self,
+        problem: &Problem,
+        objectives: &[ParsedObjective],
+        limits: &Limits,
+    ) -> Result<Task, Errors> {
         ground_with(self, self.domain(), problem, objectives, limits)
     }
 
     fn ground_exact(
         &self,
         problem: &Problem,
-        objectives: &[Metric],
+        objectives: &[ParsedObjective],
         limits: &Limits,
     ) -> Result<ExactTask, Errors> {
         let (domain, problem) = self.narrowed(problem);
         planner::ground_exact(&domain, &problem, &config(self, objectives, limits))
-            .map_err(|errors| messages(self, &errors))
+            .map_err(|errors| messages(self, objectives, &errors))
     }
 
     fn ground_concurrent(
         &self,
         problem: &Problem,
-        objectives: &[Metric],
+        objectives: &[ParsedObjective],
         separation: &BigRational,
         limits: &Limits,
     ) -> Result<ConcurrentTask, Errors> {
         let (domain, problem) = self.narrowed(problem);
         planner::ground_concurrent(&domain, &problem, &config(self, objectives, limits), separation)
-            .map_err(|errors| messages(self, &errors))
+            .map_err(|errors| messages(self, objectives, &errors))
     }
 
     fn written(&self, mut plan: Plan) -> Plan {
@@ -104,12 +114,12 @@ pub(crate) fn ground_with(
     mission: &Mission,
     domain: &Domain,
     problem: &Problem,
-    objectives: &[Metric],
+    objectives: &[ParsedObjective],
     limits: &Limits,
 ) -> Result<Task, Errors> {
     let (domain, problem) = narrowed(mission, domain, problem);
     planner::ground(&domain, &problem, &config(mission, objectives, limits))
-        .map_err(|errors| messages(mission, &errors))
+        .map_err(|errors| messages(mission, objectives, &errors))
 }
 
 /// Returns a planner for problems that differ from `problem` only in their state and availability
@@ -129,23 +139,29 @@ pub(crate) fn replanner(mission: &Mission, problem: &Problem, limits: &Limits) -
     Replanner::new(mission.domain(), problem, &available, &config(mission, &[], limits))
 }
 
-fn config(mission: &Mission, objectives: &[Metric], limits: &Limits) -> GroundConfig {
+fn config(mission: &Mission, objectives: &[ParsedObjective], limits: &Limits) -> GroundConfig {
     GroundConfig::default()
         .with_solves(mission.solves())
-        .with_objectives(objectives.to_vec())
+        .with_objectives(objectives.iter().map(|objective| objective.metric.clone()).collect())
         .with_limits(limits.clone())
 }
 
-fn messages(mission: &Mission, errors: &[planner::Error]) -> Errors {
-    let (domain, problem) = (mission.domain_source(), mission.problem_source());
-    let message = |error: &planner::Error| match error.place() {
-        Some(place) => {
-            let source = if place.file == planner::File::Domain { domain } else { problem };
-            let diagnostic =
-                Diagnostic::new(source, place.span, Severity::Error, error.code(), error.to_string());
-            Message::from_pddl(&[diagnostic], &[domain, problem]).swap_remove(0)
+fn messages(mission: &Mission, objectives: &[ParsedObjective], errors: &[planner::Error]) -> Errors {
+    let source = |file: planner::File| match file {
+        planner::File::Domain => Some(mission.domain_source()),
+        planner::File::Problem => Some(mission.problem_source()),
+        planner::File::Objective(index) => objectives.get(index).map(|objective| &objective.source),
+    };
+    let message = |error: &planner::Error| {
+        let located = error.place().and_then(|place| Some((source(place.file)?, place.span)));
+        match located {
+            Some((source, span)) => {
+                let diagnostic =
+                    Diagnostic::new(source, span, Severity::Error, error.code(), error.to_string());
+                Message::from_pddl(&[diagnostic], &[source]).swap_remove(0)
+            }
+            None => Message::error(error.code(), error.to_string()),
         }
-        None => Message::error(error.code(), error.to_string()),
     };
     errors.iter().map(message).collect()
 }

@@ -131,7 +131,7 @@ impl<'m, 'r> Planner<'m, 'r> {
     }
 
     /// Requests up to `most` further plans of the optimal cost, or none if `most` is `None`. Requires sequential plans,
-    /// the problem's own metric, and numbers that are not too large for integers.
+    /// the problem's own metric, and numbers that are not too large for integers (E304).
     #[must_use]
     pub fn alternatives(mut self, most: impl Into<Option<usize>>) -> Self {
         self.alternatives = most.into();
@@ -167,7 +167,7 @@ impl<'m, 'r> Planner<'m, 'r> {
     /// It is not an error if no plan is found or optimality is not proved: see [`Solution::status`].
     pub fn plan(self) -> Result<Planned<'m>, Errors> {
         let objectives = Objectives::read(self.mission, &self.problem, &self.minimize)?;
-        let several = objectives.metrics.len() > 1;
+        let several = objectives.parsed.len() > 1;
         match (&self.separation, self.alternatives) {
             (Some(_), Some(_)) => Err(apart("plans whose actions overlap have no alternatives")),
             (None, Some(_)) if !self.minimize.is_empty() => Err(apart(
@@ -196,7 +196,11 @@ impl<'m, 'r> Planner<'m, 'r> {
         let objectives = objectives.map(str::to_owned);
         let objectives = Objectives::read(self.mission, &self.problem, &objectives)?;
         let began = Instant::now();
-        let task = self.mission.ground(&self.problem, &objectives.metrics, &self.config.limits)?;
+        let task = match self.mission.ground(&self.problem, &objectives.parsed, &self.config.limits) {
+            Ok(task) => task,
+            Err(refused) if is_too_large(&refused) => return Err(unless_omitted(refused, &["`--pareto`"])),
+            Err(refused) => return Err(refused),
+        };
         let preparation = Preparation { ground: began.elapsed(), ..Preparation::default() };
         let config = self.config.clone();
         let front = planner::pareto(&task, &config, &mut self.improvement_listener());
@@ -217,13 +221,14 @@ impl<'m, 'r> Planner<'m, 'r> {
     ) -> Result<Planned<'m>, Errors> {
         let began = Instant::now();
         let limits = self.config.limits.clone();
-        let task = self.mission.ground_concurrent(&self.problem, &objectives.metrics, separation, &limits)?;
+        let task = self.mission.ground_concurrent(&self.problem, &objectives.parsed, separation, &limits)?;
         let ground = began.elapsed();
         let mut solution = optimize_concurrent(&task, &limits, &mut self.improvement_listener());
         let reading = Reading::concurrent(separation);
         if let Some(plan) = solution.plan.take() {
             let mut problem = self.problem.clone();
-            problem.metric = objectives.metrics.first().cloned().or(problem.metric);
+            let objective = objectives.parsed.first();
+            problem.metric = objective.map(|objective| objective.metric.clone()).or(problem.metric);
             // The removal of superfluous actions may take half of the extended time; the other half is for the
             // validator.
             solution.plan = Some(lean(self.mission, &problem, plan, &reading, &limits.extended().half()));
@@ -236,12 +241,10 @@ impl<'m, 'r> Planner<'m, 'r> {
     fn sequential(mut self, objectives: Objectives) -> Result<Planned<'m>, Errors> {
         let began = Instant::now();
         let config = self.config.clone();
-        let task = match self.mission.ground(&self.problem, &objectives.metrics, &config.limits) {
+        let task = match self.mission.ground(&self.problem, &objectives.parsed, &config.limits) {
             Ok(task) => task,
             // Rationals of any size are slower, so integers are tried first.
-            Err(refused) if is_too_large(&refused) && self.alternatives.is_none() => {
-                return self.exact(objectives, refused);
-            }
+            Err(refused) if is_too_large(&refused) => return self.exact(objectives, refused),
             Err(refused) => return Err(refused),
         };
         let ground = began.elapsed();
@@ -265,14 +268,21 @@ impl<'m, 'r> Planner<'m, 'r> {
     }
 
     /// Plans by search alone, in exact rationals. `refused` are the messages about numbers that are
-    /// too large for integers, and the error if there are several objectives.
+    /// too large for integers, and the error if the search in rationals does not support the request.
     fn exact(self, objectives: Objectives, refused: Errors) -> Result<Planned<'m>, Errors> {
-        // The search in rationals supports a single objective.
-        if objectives.metrics.len() > 1 {
-            return Err(refused);
+        let unsupported = [
+            (objectives.parsed.len() > 1, "a second objective"),
+            (self.alternatives.is_some(), "`--alternatives`"),
+            (self.config.engine == Engine::Sat, "`--engine sat`"),
+            (self.config.confirm, "`--confirm`"),
+        ];
+        let unsupported = unsupported.into_iter().filter(|(is_requested, _)| *is_requested);
+        let unsupported: Vec<&str> = unsupported.map(|(_, part)| part).collect();
+        if !unsupported.is_empty() {
+            return Err(unless_omitted(refused, &unsupported));
         }
         let began = Instant::now();
-        let task = self.mission.ground_exact(&self.problem, &objectives.metrics, &self.config.limits)?;
+        let task = self.mission.ground_exact(&self.problem, &objectives.parsed, &self.config.limits)?;
         let ground = began.elapsed();
         let point = valued(optimize_exact(&task, &self.config), &objectives);
         let reading = Reading::sequential(task.is_timed());
@@ -391,11 +401,20 @@ fn is_too_large(messages: &[Message]) -> bool {
     !messages.is_empty() && messages.iter().all(|message| message.code == "E304")
 }
 
+/// Adds to messages about numbers that are too large for integers which parts of the request prevent the use of exact
+/// rationals.
+fn unless_omitted(refused: Errors, unsupported: &[&str]) -> Errors {
+    let unsupported = unsupported.join(" and ");
+    let help =
+        format!("without {unsupported}, planning uses exact rationals, which hold numbers of any size");
+    refused.map(|message| message.with_help(help.clone()))
+}
+
 /// Converts a solution to a point. The cost of the plan is its only value, if there is a plan and
 /// an objective replaces the metric.
 fn valued(solution: Solution, objectives: &Objectives) -> Point {
     let cost = solution.plan.as_ref().map(|plan| plan.cost.clone());
-    Point { values: cost.into_iter().filter(|_| !objectives.metrics.is_empty()).collect(), solution }
+    Point { values: cost.into_iter().filter(|_| !objectives.parsed.is_empty()).collect(), solution }
 }
 
 fn apart(text: &str) -> Errors {

@@ -1,31 +1,31 @@
 //! The objectives of a plan, and the check of their values by the validator.
 
-use pddl::ast::{Metric, Problem};
+use pddl::ast::Problem;
 use planner::{Limits, Point};
 
 use crate::message::{Errors, Message};
-use crate::mission::{Mission, Reading, Unconfirmed, confirm};
+use crate::mission::{Mission, ParsedObjective, Reading, Unconfirmed, confirm};
 
 /// Objectives that replace the problem's metric, the most important first. Empty if the problem's
 /// metric is kept.
 #[derive(Debug, Clone)]
 pub(super) struct Objectives {
     pub(super) texts: Vec<String>,
-    pub(super) metrics: Vec<Metric>,
+    pub(super) parsed: Vec<ParsedObjective>,
 }
 
 impl Objectives {
     pub(super) fn read(mission: &Mission, problem: &Problem, texts: &[String]) -> Result<Self, Errors> {
-        let mut metrics = Vec::new();
+        let mut parsed = Vec::new();
         let mut messages = Vec::new();
         for text in texts {
             match mission.objective(problem, text) {
-                Ok(metric) => metrics.push(metric),
+                Ok(objective) => parsed.push(objective),
                 Err(more) => messages.extend(more),
             }
         }
         Errors::unless_empty(messages)?;
-        Ok(Self { texts: texts.to_vec(), metrics })
+        Ok(Self { texts: texts.to_vec(), parsed })
     }
 
     /// Executes the plan of `point`, if there is one, with the validator, and compares the value of
@@ -43,11 +43,11 @@ impl Objectives {
         limits: &Limits,
     ) -> Result<(), Errors> {
         let Some(plan) = &point.solution.plan else { return Ok(()) };
-        if self.metrics.is_empty() {
+        if self.parsed.is_empty() {
             confirm(mission, problem, plan, reading, limits).map_err(unconfirmed)?;
         }
-        for (metric, value) in self.metrics.iter().zip(&point.values) {
-            let problem = Problem { metric: Some(metric.clone()), ..problem.clone() };
+        for (objective, value) in self.parsed.iter().zip(&point.values) {
+            let problem = Problem { metric: Some(objective.metric.clone()), ..problem.clone() };
             let mut plan = plan.clone();
             plan.cost = value.clone();
             confirm(mission, &problem, &plan, reading, limits).map_err(unconfirmed)?;

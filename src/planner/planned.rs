@@ -159,8 +159,8 @@ impl Planned<'_> {
             }
         };
         let mut problem = self.problem.clone();
-        if let [metric] = &self.objectives.metrics[..] {
-            problem.metric = Some(metric.clone());
+        if let [objective] = &self.objectives.parsed[..] {
+            problem.metric = Some(objective.metric.clone());
         }
         let plan = self.solution.plan.as_ref().map_or_else(String::new, Plan::to_string);
         let (mission, solution) = (self.mission, &self.solution);
@@ -190,9 +190,10 @@ impl PlannedFront<'_> {
     pub fn certify(&self, directory: &Path) -> Result<(), Message> {
         let wrong = |reason: &str| Message::error("M120", format!("no certificate: {reason}"));
         let (mission, problem, limits) = (self.mission, &self.problem, &self.limits);
-        let [first, second] = &self.objectives.metrics[..] else {
+        let [first, second] = &self.objectives.parsed[..] else {
             return Err(wrong("a front has two objectives"));
         };
+        let [first, second] = [&first.metric, &second.metric];
         match (self.front.status, &self.front.points[..]) {
             (Status::Unsolvable, [point]) => {
                 let problem = Problem { metric: Some(first.clone()), ..problem.clone() };

@@ -52,6 +52,22 @@ fn seeds() -> Vec<String> {
     vec!["seed".to_owned()]
 }
 
+impl Sections {
+    /// Returns the keys in braces in the command and the generator. Other keys are options of the command.
+    fn placeholders(&self) -> BTreeSet<&str> {
+        let generator = self.generate.iter().flat_map(|generate| &generate.run);
+        self.command.iter().chain(generator).flat_map(|word| placeholders(word)).collect()
+    }
+
+    fn values(&self, key: &str, variation: &Variation) -> Result<Vec<Value>, String> {
+        if ["format", "quiet"].contains(&key) && !self.placeholders().contains(key) {
+            let text = "cannot be varied: every run has the options `--format json` and `--quiet`";
+            return Err(text.to_owned());
+        }
+        values(variation)
+    }
+}
+
 /// The values of a key.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(untagged)]
@@ -212,7 +228,7 @@ impl Study {
         }
         let mut keys: Vec<(String, Vec<Value>)> = Vec::new();
         for (key, variation) in &sections.vary {
-            match values(variation) {
+            match sections.values(key, variation) {
                 Ok(values) => keys.push((key.clone(), values)),
                 Err(text) => {
                     mistakes
@@ -360,10 +376,7 @@ impl Study {
     pub fn words(&self, run: &Planned, directory: &Path) -> Vec<String> {
         let mut words: Vec<String> =
             self.sections.command.iter().map(|word| filled(word, &run.vary, directory)).collect();
-        let generator = self.sections.generate.iter().flat_map(|generate| &generate.run);
-        // Keys without a placeholder become options of the command.
-        let named: BTreeSet<&str> =
-            self.sections.command.iter().chain(generator).flat_map(|word| placeholders(word)).collect();
+        let named = self.sections.placeholders();
         for (key, value) in run.vary.iter().filter(|(key, _)| !named.contains(key.as_str())) {
             let several = match value {
                 Value::Array(values) => values.clone(),
@@ -521,6 +534,14 @@ mod tests {
             let errors = study(&format!("command = ['plan']\ntime_limit = {limit}\n")).expect_err(limit);
             assert!(errors.to_string().contains("time_limit"), "{errors}");
         }
+        let quiet = study("command = ['plan']\n[vary]\nquiet = [true, false]\nformat = ['json']\n");
+        let errors = quiet.expect_err("every run is quiet");
+        assert_eq!(errors.iter().count(), 2, "{errors}");
+        for key in ["quiet", "format"] {
+            let text = format!("`vary.{key}` cannot be varied: every run has the options `--format json`");
+            assert!(errors.to_string().contains(&text), "{errors}");
+        }
+        assert!(study("command = ['plan', '{quiet}']\n[vary]\nquiet = ['a.toml']\n").is_ok());
         let errors = study("command = ['plan', '{x}']").expect_err("x is not varied");
         assert!(errors.to_string().contains("{x}"), "{errors}");
         assert!(

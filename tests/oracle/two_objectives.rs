@@ -187,7 +187,8 @@ fn judge_seed(seed: u64, tally: &mut Tally) {
     }
     tally.count(format!("courier: {} points", points.len()));
     let front = (&mission, &problem);
-    certify::check_front(&case, front, &objectives, (&computed.points, false), tally);
+    let metrics = objectives.map(|objective| objective.metric);
+    certify::check_front(&case, front, &metrics, (&computed.points, false), tally);
     // Fronts that lack a point.
     let name = case.name.clone();
     let mut case = case;
@@ -195,7 +196,7 @@ fn judge_seed(seed: u64, tally: &mut Tally) {
         case.name = format!("{name}-without-{position}");
         let mut incomplete = computed.points.clone();
         incomplete.remove(position);
-        certify::check_front(&case, front, &objectives, (&incomplete, true), tally);
+        certify::check_front(&case, front, &metrics, (&incomplete, true), tally);
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::common::{Outcome, metaplan, metaplan_in, root, verify_in};
+use crate::common::{Outcome, headlines, metaplan, metaplan_in, root, verify_in};
 
 pub fn certificate(directory: &Path, arguments: &[&str]) -> String {
     let target = directory.join("certificate").display().to_string();
@@ -495,6 +495,79 @@ fn unsupported_features_get_no_certificate() {
     assert!(outcome.stderr.contains("M120"), "{outcome:#?}");
     assert!(outcome.stderr.contains("does not cover derived predicates beside"), "{outcome:#?}");
     assert!(!directory.path().join("c").exists());
+}
+
+#[test]
+fn only_the_reason_that_applies_is_reported() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let check = |domain: &str, problem: &str, options: &[&str], reason: &str| {
+        let domain = format!("(define (domain d) {domain})");
+        std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
+        let problem = format!("(define (problem x) (:domain d) {problem})");
+        std::fs::write(directory.path().join("p.pddl"), problem).expect("a file");
+        let arguments = [&["plan", "d.pddl", "p.pddl", "--certificate", "c"], options].concat();
+        let outcome = metaplan_in(directory.path(), &arguments, "");
+        assert_eq!(outcome.status, 3, "{outcome:#?}");
+        let expected = format!("error[M120]: no certificate: {reason}");
+        assert!(headlines(&outcome.stderr).lines().any(|line| line == expected), "{reason}: {outcome:#?}");
+        assert!(!directory.path().join("c").exists());
+    };
+    let two_steps = "(:predicates (ready) (done))
+      (:action prepare :parameters () :precondition () :effect (ready))
+      (:action work :parameters () :precondition (ready) :effect (done))";
+    check(
+        two_steps,
+        "(:init) (:goal (done))",
+        &["--horizon", "1"],
+        "nothing is proved for plans of any length",
+    );
+    let costs = "(:init (= (cost) 0) (= (level) 1)) (:goal (done))";
+    check(
+        "(:predicates (done)) (:functions (cost) (level))
+          (:action work :parameters () :precondition () :effect (and (done) (increase (cost) 1) (increase (level) 2)))",
+        costs,
+        &["--minimize", "cost", "--minimize", "level"],
+        "certificates support a single objective",
+    );
+    check(
+        "(:predicates (done) (charged)) (:functions (cost) (level))
+          (:action charge :parameters () :precondition (not (charged))
+            :effect (and (charged) (increase (level) 1)))
+          (:action work :parameters () :precondition () :effect (and (done) (increase (cost) (level))))",
+        costs,
+        &["--minimize", "cost"],
+        "the metric reads (cost), which actions change by amounts that depend on the state",
+    );
+    // No action adds `done`.
+    check(
+        "(:predicates (done) (paid)) (:functions (cost) (level))
+          (:action earn :parameters () :precondition () :effect (and (paid) (decrease (cost) 1)))",
+        costs,
+        &["--minimize", "cost"],
+        "`earn` can improve the metric",
+    );
+    // Only `look` reads the recursive predicate, and nothing reads the effect of `look`.
+    check(
+        "(:constants b c) (:predicates (at ?x) (edge ?x ?y) (reach ?x) (seen) (done))
+          (:derived (reach ?x) (or (at ?x) (exists (?y) (and (reach ?y) (edge ?y ?x)))))
+          (:action enter :parameters () :precondition () :effect (at b))
+          (:action look :parameters () :precondition (reach c) :effect (seen))
+          (:action work :parameters () :precondition () :effect (done))",
+        "(:init (edge b c) (edge c b)) (:goal (done))",
+        &[],
+        "the comparison of the task with the files does not cover (reach c), which depends on itself and is not a \
+         variable of the task; it occurs in (look)",
+    );
+    // The idle action compares a number that has no value in the condition of its effect.
+    check(
+        "(:predicates (done) (seen)) (:functions (level))
+          (:action look :parameters () :precondition () :effect (when (> (level) 1) (seen)))
+          (:action work :parameters () :precondition () :effect (done))",
+        "(:init) (:goal (done))",
+        &[],
+        "the comparison of the task with the files does not cover a comparison without a value in `when`; it occurs \
+         in (look)",
+    );
 }
 
 /// A conflict between a conditional and an unconditional start effect excludes only the case in

@@ -1,6 +1,6 @@
 //! Tests of exit statuses and messages of the command line.
 
-use crate::common::{Outcome, copy_of_mission, edit, metaplan, metaplan_in, root};
+use crate::common::{Outcome, copy_of_mission, edit, headlines, metaplan, metaplan_in, root};
 
 /// Checks the exit status, and that standard error or output contains each text. An internal error (panic,
 /// M170) always fails the check.
@@ -334,8 +334,63 @@ fn numbers_of_any_size_are_supported() {
     // Options that need SAT formulas are refused.
     let directory = tempfile::tempdir().expect("a directory");
     let certificate = directory.path().join("certificate").display().to_string();
-    check(&plan(domain, problem, &["--certificate", &certificate]), 3, &["M120", "multiplied by fractions"]);
-    check(&plan(domain, problem, &["--alternatives", "3"]), 3, &["E304"]);
+    check(
+        &plan(domain, problem, &["--certificate", &certificate]),
+        3,
+        &["M120", "`halve` multiplies a number by a fraction"],
+    );
+    for (options, omitted) in [
+        (&["--alternatives", "3"][..], "`--alternatives`"),
+        (&["--engine", "sat"], "`--engine sat`"),
+        (&["--confirm"], "`--confirm`"),
+        (&["--alternatives", "3", "--confirm"], "`--alternatives` and `--confirm`"),
+        (&["--minimize", "total-cost", "--minimize", "big"], "a second objective"),
+        (&["--pareto", "total-cost,big"], "`--pareto`"),
+    ] {
+        let help = format!("without {omitted}, planning uses exact rationals");
+        check(&plan(domain, problem, options), 3, &["E304", &help]);
+    }
+}
+
+/// An error in an objective of the command line has its position in the text of the objective. An error in the metric of
+/// a problem has its position in the file.
+#[test]
+fn errors_in_objectives_have_their_positions() {
+    let domain =
+        "(define (domain d) (:requirements :fluents) (:predicates (p)) (:functions (cost) (risk) (zero))
+      (:action a :parameters () :precondition () :effect (and (p) (increase (cost) 1) (increase (risk) 1))))";
+    let problem = |metric: &str| {
+        format!(
+            "(define (problem x) (:domain d) (:init (= (cost) 0) (= (risk) 0) (= (zero) 0)) (:goal (p))\n{metric})"
+        )
+    };
+    let large = format!("(* 1{} (risk))", "0".repeat(40));
+    let nonlinear = "error[E303]: the expression is not linear in the fluents that actions change";
+    let divided = "error[E303]: the divisor is 0, so the expression has no value";
+    for (options, place, text) in [
+        (&["--minimize", "(* (cost) (risk))"][..], "objective:1:1", nonlinear),
+        (&["--minimize", "(+ 1 (/ (cost) (risk)))"], "objective:1:6", nonlinear),
+        (&["--minimize", "(+ 1 (/ (cost) 0))"], "objective:1:6", divided),
+        (&["--minimize", "(/ (cost) (zero))"], "objective:1:1", divided),
+        (&["--minimize", "cost", "--minimize", "(+ (risk) (/ 1 (zero)))"], "objective:1:11", divided),
+        (&["--pareto", "cost,(+ 2 (* (risk) (risk)))"], "objective:1:6", nonlinear),
+        (
+            &["--minimize", "cost", "--minimize", &large],
+            "objective:1:1",
+            "error[E304]: the objective (`a`): a number",
+        ),
+    ] {
+        let outcome = plan(domain, &problem(""), options);
+        check(&outcome, 3, &[]);
+        let line = format!("{place}: {text}");
+        assert!(headlines(&outcome.stderr).contains(&line), "{options:?}: {outcome:#?}");
+    }
+    for (metric, text) in [("(* (cost) (risk))", nonlinear), ("(/ (cost) 0)", divided)] {
+        let outcome = plan(domain, &problem(&format!("(:metric minimize {metric})")), &[]);
+        check(&outcome, 3, &[]);
+        let line = format!("problem.pddl:2:19: {text}");
+        assert!(headlines(&outcome.stderr).contains(&line), "{metric}: {outcome:#?}");
+    }
 }
 
 #[test]

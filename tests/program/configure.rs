@@ -52,7 +52,11 @@ fn all_unknown_names_are_reported() {
         (&["--budget", "safety=many"], "decimal number"),
         (&["--budget", "safety=-1"], "the budget of `safety` is -1, but should not be negative"),
         (&["--budget", "safety=-0.001", "--budget", "safety=3"], "M142"),
-        (&["--require", "safety=1"], "FUNCTION.ATTRIBUTE=BOUND"),
+        (&["--require", "safety=1"], "FUNCTION.ATTRIBUTE=BOUND, such as `f_move.safety=0.5`"),
+        (&["--require", "f_localization.safety"], "FUNCTION.ATTRIBUTE=BOUND"),
+        (&["--require", "f_localization.safety=high"], "`high` is not a decimal number"),
+        (&["--require", "f_localisation.safety=0.5"], "M140"),
+        (&["--require", "f_localisation.safety=0.5"], "did you mean `f_localization`?"),
         (&["--most", "safety", "--least", "safety"], "cannot be used with"),
         (&["--set", "safety=x"], "not a decimal number"),
         (&["--fail", "c_none"], "c_none"),
@@ -85,7 +89,20 @@ fn a_requirement_needs_an_objective_of_the_command() {
     assert_eq!(metaplan(&base).status, 0);
     let outcome = metaplan(&[&base[..], &require].concat());
     assert_eq!(outcome.status, 2, "{}", outcome.stderr);
-    assert!(outcome.stderr.contains("needs `--objective f_localization`"), "{}", outcome.stderr);
+    for part in [
+        "M107",
+        "`--require f_localization.safety` needs `--objective f_localization`",
+        "it states",
+        "help: add",
+    ] {
+        assert!(outcome.stderr.contains(part), "{part}: {}", outcome.stderr);
+    }
+    // An objective of the command for another function does not suffice.
+    let outcome = metaplan(&[&base[..], &["--objective", "f_motion"], &require].concat());
+    assert_eq!(outcome.status, 2, "{}", outcome.stderr);
+    for part in ["needs `--objective f_localization`", "the functions of `--objective` are: f_motion"] {
+        assert!(outcome.stderr.contains(part), "{part}: {}", outcome.stderr);
+    }
     let outcome = metaplan(&[&base[..], &["--objective", "f_localization"], &require].concat());
     assert_eq!(outcome.status, 0, "{}", outcome.stderr);
 }

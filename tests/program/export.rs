@@ -37,6 +37,15 @@ fn availability_and_values_are_filled_in() {
     assert!(!outcome.stdout.contains("(fd_available fd_amcl_kinect)"), "{}", outcome.stdout);
 }
 
+#[test]
+fn variants_of_the_probabilistic_model_are_no_variants_of_pddl() {
+    for setting in ["corrected", "published"] {
+        let outcome = metaplan(&["export", "missions/ugv.toml", "--to", "pddl", "--setting", setting]);
+        assert_eq!((outcome.status, outcome.stdout.as_str()), (2, ""), "{outcome:#?}");
+        assert!(outcome.stderr.contains("error[M107]: `--setting` selects a variant"), "{outcome:#?}");
+    }
+}
+
 const DOMAIN: &str = "(define (domain d) (:types dock - place) (:constants home - dock)
  (:predicates (at ?x -place) (seen ?x - ghost))
  (:derived (seen ?x) (at ?x))

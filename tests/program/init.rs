@@ -3,6 +3,8 @@
 
 use std::path::Path;
 
+#[cfg(unix)]
+use crate::common::program;
 use crate::common::{headlines, metaplan_in, root};
 
 fn check(template: &str, cost: &str, scenarios: &[(&str, &str)]) {
@@ -91,6 +93,27 @@ fn nothing_is_overwritten() {
         assert_eq!(metaplan_in(here, &["init", name], "").status, 2, "{name}");
     }
     assert_eq!(names(here).len(), 2, "{:?}", names(here));
+}
+
+#[test]
+#[cfg(unix)]
+fn the_proposed_command_can_be_pasted_into_a_shell() {
+    let directory = tempfile::tempdir().expect("a directory");
+    for (name, word) in [
+        ("étage-2", "étage-2/mission.toml"),
+        ("two words", "'two words/mission.toml'"),
+        ("it's $HOME", r"'it'\''s $HOME/mission.toml'"),
+        ("`id`;*", "'`id`;*/mission.toml'"),
+        ("-x", "./-x/mission.toml"),
+    ] {
+        let outcome = metaplan_in(directory.path(), &["init", "--", name], "");
+        let (_, next) = outcome.stdout.split_once("\nnext: ").unwrap_or_else(|| panic!("{outcome:#?}"));
+        assert_eq!(next, format!("metaplan plan {word}\n"));
+        let mut shell = std::process::Command::new("sh");
+        shell.arg("-c").arg(next.replacen("metaplan", "\"$0\"", 1)).arg(program());
+        let planned = shell.current_dir(directory.path()).output().expect("a shell");
+        assert!(planned.status.success(), "{name}: {planned:?}");
+    }
 }
 
 #[test]

@@ -16,6 +16,17 @@ fn error_codes_are_explained() {
     let unknown = metaplan(&["explain", "M999"]);
     assert_eq!(unknown.status, 2, "{unknown:#?}");
     assert!(unknown.stderr.contains("error[M138]: there is no code `M999`"), "{unknown:#?}");
+    // A code takes neither a design nor the options of a mission.
+    for more in [&["fd_lidar"][..], &["--fail", "c_lidar"], &["--scenario", "night"], &["--kb", "robot.ttl"]]
+    {
+        let refused = metaplan(&[&["explain", "M118"], more].concat());
+        assert_eq!((refused.status, refused.stdout.as_str()), (2, ""), "{more:?}: {refused:#?}");
+        assert!(
+            refused.stderr.contains("error[M107]: a code has neither a design"),
+            "{more:?}: {refused:#?}"
+        );
+        assert!(refused.stderr.contains("`metaplan explain M118`"), "{more:?}: {refused:#?}");
+    }
     // If a file has the name of a code, it is read as a mission.
     let directory = tempfile::tempdir().expect("a directory");
     std::fs::write(directory.path().join("M118"), "name = 1").expect("a file");

@@ -36,6 +36,15 @@ pub struct Mission {
     warnings: Vec<Message>,
 }
 
+/// An objective that replaces the metric of a problem.
+#[derive(Debug, Clone)]
+pub struct ParsedObjective {
+    /// The objective, which is minimised. Its positions refer to `source`.
+    pub metric: Metric,
+    /// The text of the objective.
+    pub source: Source,
+}
+
 impl Mission {
     /// Joins a domain and a problem with a knowledge base, if there is one.
     ///
@@ -271,13 +280,15 @@ impl Mission {
     ///
     /// # Errors
     /// All syntax and type errors of the expression.
-    pub fn objective(&self, problem: &Problem, text: &str) -> Result<Metric, Errors> {
+    pub fn objective(&self, problem: &Problem, text: &str) -> Result<ParsedObjective, Errors> {
         let text = text.trim();
         let is_word = !text.starts_with('(') && !text.eq_ignore_ascii_case("total-time");
         let text = if is_word && !text.is_empty() { format!("({text})") } else { text.to_owned() };
         let source = Source::new("objective", text);
-        pddl::read_objective(Direction::Minimize, &source, &self.domain, problem)
-            .map_err(|diagnostics| Message::from_pddl(&diagnostics, &[&source]).into())
+        match pddl::read_objective(Direction::Minimize, &source, &self.domain, problem) {
+            Ok(metric) => Ok(ParsedObjective { metric, source }),
+            Err(diagnostics) => Err(Message::from_pddl(&diagnostics, &[&source]).into()),
+        }
     }
 }
 

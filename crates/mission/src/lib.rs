@@ -27,7 +27,7 @@ pub use binding::{Bindings, atom};
 pub use called::{Names, Place};
 pub use codes::CODES;
 pub use doubts::doubt_about;
-pub use joined::Mission;
+pub use joined::{Mission, ParsedObjective};
 pub use message::{Errors, Message};
 pub use native::CoAdaptation;
 pub use set::unused_measurement;

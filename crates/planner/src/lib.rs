@@ -27,7 +27,9 @@ mod optimize;
 mod planner;
 mod replan;
 
-pub use self::certificate::{Certificate, Outputs as RefutationOutputs, certify, certify_exact, refute};
+pub use self::certificate::{
+    Certificate, NoCertificate, Outputs as RefutationOutputs, certify, certify_exact, refute,
+};
 pub use alternatives::{Alternatives, Forced, alternatives};
 pub use configuration::{Assignment, DesignChoice, configure};
 pub use encodings::encode::StepSemantics;

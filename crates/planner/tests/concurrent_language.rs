@@ -153,6 +153,27 @@ fn errors_about_unscalable_numbers_name_the_action() {
 }
 
 #[test]
+fn a_metric_with_the_divisor_zero_is_refused() {
+    let domain = "(define (domain d) (:predicates (g))
+      (:durative-action a :parameters () :duration (= ?duration 2) :condition () :effect (at end (g))))";
+    for metric in ["(/ (total-time) 0)", "(+ (total-time) (/ 2 0))"] {
+        let text =
+            format!("(define (problem p) (:domain d) (:init) (:goal (g)) (:metric minimize {metric}))");
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", &*text)).expect("PDDL");
+        let separation = BigRational::new(BigInt::from(1), BigInt::from(1000));
+        let errors = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
+            .expect_err("the metric has no value");
+        let [error] = &errors[..] else { panic!("{errors:?}") };
+        assert_eq!(error.code(), "E303");
+        assert!(error.to_string().contains("the divisor is 0"), "{error}");
+        let place = error.place().expect("a place");
+        assert_eq!(place.file, metaplan_planner::File::Problem);
+        assert!(text[place.span.start as usize..].starts_with("(/"), "{place:?}");
+    }
+}
+
+#[test]
 fn search_statistics_and_history_are_recorded() {
     let tower = |count: usize| {
         let names: Vec<String> = (0..count).map(|index| format!("k{index}")).collect();

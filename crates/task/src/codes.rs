@@ -16,9 +16,9 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "E303",
-        "An expression is not linear.",
-        "It has a product or quotient of numbers that actions change.",
-        "Use a constant factor, or split the action into cases.",
+        "An expression is not linear, or has no value.",
+        "It has a product or quotient of numbers that actions change, or a metric has the divisor 0.",
+        "Use a constant factor, or split the action into cases. Correct the divisor.",
     ],
     [
         "E304",

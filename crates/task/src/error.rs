@@ -3,21 +3,24 @@
 use crate::limits::Interrupted;
 use pddl::ast::Span;
 
-/// The PDDL file that contains a source location.
+/// The text that contains a source location.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum File {
     /// The domain file.
     Domain,
     /// The problem file.
     Problem,
+    /// The text of the objective at this index of
+    /// [`GroundConfig::objectives`](crate::ground::GroundConfig::objectives).
+    Objective(usize),
 }
 
-/// A source location in one of the two PDDL files.
+/// A source location in one of the two PDDL files, or in an objective.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Place {
-    /// The file.
+    /// The file or the objective.
     pub file: File,
-    /// Text range in the file.
+    /// Text range in it.
     pub span: Span,
 }
 
@@ -62,6 +65,13 @@ pub enum Error {
         /// Source location.
         place: Place,
     },
+    /// A quotient in a metric whose divisor is 0. A metric must have a value; elsewhere, such a quotient is only
+    /// undefined.
+    #[error("the divisor is 0, so the expression has no value")]
+    ZeroDivisor {
+        /// Source location of the quotient.
+        place: Place,
+    },
     /// A number that is too large for the integers of the planner after scaling, or fractions that no
     /// admissible factor scales to integers.
     #[error(
@@ -70,7 +80,7 @@ pub enum Error {
     Overflow {
         /// Description of the quantity that contains the number.
         what: String,
-        /// Source location of the action that contains the number, if known.
+        /// Source location of the objective, metric or action that contains the number, if known.
         place: Option<Place>,
     },
     /// The deadline passed or the run was interrupted before grounding was complete.
@@ -122,7 +132,7 @@ impl Error {
         match self {
             Self::Unsupported { .. } | Self::NoValue { .. } => "E301",
             Self::Unknown { .. } => "E302",
-            Self::NonLinear { .. } => "E303",
+            Self::NonLinear { .. } | Self::ZeroDivisor { .. } => "E303",
             Self::Overflow { .. } => "E304",
             Self::Rules(_) => "E305",
             Self::Interrupted => "E306",
@@ -135,7 +145,8 @@ impl Error {
             Self::Unsupported { place, .. }
             | Self::NoValue { place, .. }
             | Self::Unknown { place, .. }
-            | Self::NonLinear { place } => Some(*place),
+            | Self::NonLinear { place }
+            | Self::ZeroDivisor { place } => Some(*place),
             Self::Overflow { place, .. } => *place,
             Self::Rules(_) | Self::Interrupted => None,
         }

@@ -150,7 +150,8 @@ impl<'c> Comparison<'c> {
     /// Checks that the goal of the PDDL files implies the goal of the task.
     pub(super) fn goal(&self) -> Result<()> {
         let mut reader = Reader::new(self.task.world, self.task.invariant, self.task.axioms);
-        let goal = reader.formula(&self.task.world.problem.goal, true)?;
+        let goal = reader.formula(&self.task.world.problem.goal, true);
+        let goal = goal.map_err(|cause| cause.within("the goal"))?;
         let task_goal = self.task.condition(&self.task.model.goal, &[], &[]);
         // Plans need not end with a wait, so the goal is required only in states that do not follow
         // a wait.
@@ -216,11 +217,7 @@ impl<'c> Comparison<'c> {
     /// Checks that operators simulate a case. Returns `false` if no operator is needed, because the
     /// case does not change the task state and its cost is not negative.
     pub(super) fn case(&self, action: &Action, arguments: &[u32], case: &Case) -> Result<bool> {
-        let name = || {
-            let words = arguments.iter().map(|object| self.task.world.name(*object));
-            let words: Vec<&str> = std::iter::once(action.identifier.name.as_str()).chain(words).collect();
-            format!("({})", words.join(" "))
-        };
+        let name = || self.task.world.call(action, arguments);
         let instance = Instance { cost: self.cost(case)?, name: &name };
         if instance.cost >= BigRational::zero()
             && effects::compare(self.task, case, &case.known, None).is_ok()

@@ -180,7 +180,8 @@ impl<'f> Files<'f> {
         let mut reader = Reader::new(&self.world, invariant, axioms);
         let names = schema.parameters.iter().map(|parameter| &parameter.identifier.name);
         reader.binding = names.zip(instance.arguments.iter().copied()).collect();
-        Ok(action::cases(reader, &self.names.structure, schema)?)
+        let cases = action::cases(reader, &self.names.structure, schema);
+        Ok(cases.map_err(|cause| cause.within(&self.world.call(schema, &instance.arguments)))?)
     }
 
     fn witness(&self) -> Result<String> {

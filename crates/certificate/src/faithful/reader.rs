@@ -352,10 +352,12 @@ impl<'r> Reader<'r> {
     }
 
     fn circular(&self, key: &Key) -> Cause {
-        Cause::unsupported(format!(
-            "{}, which depends on itself and is not a variable of the task, or on what the same action changes",
-            self.world.show(key)
-        ))
+        let atom = self.world.show(key);
+        Cause::unsupported(if self.is_touched(key.0) {
+            format!("{atom}, which depends on itself and on what changes during the same action")
+        } else {
+            format!("{atom}, which depends on itself and is not a variable of the task")
+        })
     }
 
     fn body(&mut self, key: &Key) -> Result<Formula, Cause> {

@@ -10,7 +10,7 @@ use crate::faithful::timeline::{self, Timeline};
 use crate::faithful::verdict::Cause;
 use pddl::TypeHierarchy;
 use pddl::ast::{
-    ActionBody, Atom, Derived, Domain, Effect, InitialElement, Name, Problem, Term, TypeExpression,
+    Action, ActionBody, Atom, Derived, Domain, Effect, InitialElement, Name, Problem, Term, TypeExpression,
 };
 
 pub(super) struct World<'w> {
@@ -200,6 +200,13 @@ impl<'w> World<'w> {
         }
         let words = std::iter::once(&key.0).chain(&key.1);
         let words: Vec<String> = words.map(|symbol| self.name(*symbol).to_ascii_lowercase()).collect();
+        format!("({})", words.join(" "))
+    }
+
+    /// Formats an action instance.
+    pub(super) fn call(&self, action: &Action, arguments: &[u32]) -> String {
+        let words = arguments.iter().map(|object| self.name(*object));
+        let words: Vec<&str> = std::iter::once(action.identifier.name.as_str()).chain(words).collect();
         format!("({})", words.join(" "))
     }
 

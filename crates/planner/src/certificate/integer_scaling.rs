@@ -5,14 +5,12 @@ use num_bigint::BigInt;
 use num_integer::Integer as _;
 use num_traits::{One, Signed};
 
+use crate::certificate::no_certificate::{MAX_DENOMINATOR_BITS, NoCertificate, action_name};
 use task::number::Rational;
 use task::task::Task;
 use task::task::common_denominator::CommonDenominator;
 use task::task::number::TaskNumber;
 use task::task::quantity::Linear;
-
-/// Maximum number of bits of a common denominator.
-const MOST_BITS: u64 = 1 << 20;
 
 pub(super) struct Scales {
     pub(super) numbers: Integer,
@@ -29,12 +27,14 @@ impl Scales {
     }
 
     /// Computes the factors for a task whose cost bounds are counted in multiples of `unit`.
-    /// Returns `None` if an effect multiplies a number by a fraction (its values then have no
-    /// common denominator), or a denominator has too many bits.
-    pub(super) fn of(task: &Task<Rational>, unit: &Rational) -> Option<Self> {
-        let mut numbers = CommonDenominator::of_at_most(MOST_BITS);
-        let mut times = CommonDenominator::of_at_most(MOST_BITS);
-        let mut costs = CommonDenominator::of_at_most(MOST_BITS);
+    ///
+    /// # Errors
+    /// An effect multiplies a number by a fraction (its values then have no common denominator), or a denominator
+    /// has too many bits.
+    pub(super) fn of(task: &Task<Rational>, unit: &Rational) -> Result<Self, NoCertificate> {
+        let mut numbers = CommonDenominator::of_at_most(MAX_DENOMINATOR_BITS);
+        let mut times = CommonDenominator::of_at_most(MAX_DENOMINATOR_BITS);
+        let mut costs = CommonDenominator::of_at_most(MAX_DENOMINATOR_BITS);
         task.initial.numbers.iter().for_each(|number| numbers.number(number));
         let rules = task.axioms.iter().flat_map(|layer| &layer.rules).map(|rule| &rule.body);
         let conditions = task.operators.iter().map(|operator| &operator.condition);
@@ -45,7 +45,8 @@ impl Scales {
             for effect in &operator.numeric_effects {
                 numbers.quantity(&effect.value.quantity);
                 if !effect.value.coefficients.iter().all(|(_, factor)| factor.is_integer()) {
-                    return None;
+                    let action = format!("`{}`", action_name(task, operator));
+                    return Err(NoCertificate::Fraction { action });
                 }
             }
             costs.quantity(&operator.cost);
@@ -54,9 +55,11 @@ impl Scales {
         }
         costs.number(&task.objective.offset);
         costs.number(unit);
-        let costs = Integer::from(costs.get()?);
+        let [numbers, costs, times] = [numbers, costs, times]
+            .map(|denominator| denominator.get().map(Integer::from).ok_or(NoCertificate::Denominator));
+        let (numbers, costs, times) = (numbers?, costs?, times?);
         let bounds = scaled(unit, &costs);
-        Some(Self { numbers: numbers.get()?.into(), times: times.get()?.into(), costs, bounds })
+        Ok(Self { numbers, costs, times, bounds })
     }
 }
 

@@ -2,16 +2,18 @@
 //! no plan), and a SAT refutation.
 //!
 //! The crate `certificate` defines the formats and checks the certificates; it does not depend on this crate.
-//! `write` derives the argument from an exhausted search. `refute` refutes the formula "there is a cheaper plan"
+//! `write` derives the argument from an exhausted search, or returns a reason of `no_certificate`. `refute` refutes the formula "there is a cheaper plan"
 //! with a SAT solver; the checker builds this formula from the ground task. `trim` reduces the refutation \[1\] to
 //! the clauses that are needed, with hints for the checker.
 //!
 //! \[1\] M. Heule, W. Hunt, N. Wetzler: Trimming while checking clausal proofs, FMCAD 2013 (DRUP).
 
 mod integer_scaling;
+mod no_certificate;
 mod refute;
 mod trim;
 mod write;
 
+pub use no_certificate::NoCertificate;
 pub use refute::{Outputs, refute};
 pub use write::{Certificate, certify, certify_exact};

@@ -4,7 +4,7 @@ use std::hash::Hash;
 use std::sync::Arc;
 
 use ::task::context::Context;
-use ::task::limits::Limits;
+use ::task::limits::{Interrupted, Limits};
 use ::task::number::{Int, Rational};
 use ::task::plan::solution::{Solution, Status};
 use ::task::task::number::TaskNumber;
@@ -20,6 +20,7 @@ use search::bounds::{Bounds, Projection};
 use search::search::{Heuristic, closed_labels};
 
 use crate::certificate::integer_scaling::{Scales, scaled, whole};
+use crate::certificate::no_certificate::{NoCertificate, action_name};
 use crate::exact::{ExactTask, RoundedBounds};
 
 /// Certificate of optimality or of unsolvability, as two JSON documents.
@@ -31,61 +32,89 @@ pub struct Certificate {
     pub argument: String,
 }
 
-/// Creates the certificate of a solution. Returns `None` in any of these cases: the solution is not proved for
-/// plans of any length, the task has several objectives, its numeric variables have different scales, the metric is
-/// partly evaluated in the last state, operators can reduce the cost, or the search does not end within the limits.
-pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Certificate> {
-    // The format has a single scale for all numbers, and does not support metrics that are partly evaluated
-    // in the last state.
-    if !(task.number_multiples.is_empty() && task.objective.rest.is_empty()) {
-        return None;
+/// Creates the certificate of a solution.
+///
+/// # Errors
+/// Returns the first reason in [`NoCertificate`] that applies.
+pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Result<Certificate, NoCertificate> {
+    supported(task, solution)?;
+    // The format has a single scale for all numbers.
+    if !task.number_multiples.is_empty() {
+        return Err(NoCertificate::Fraction { action: "an action".to_owned() });
     }
     let cost = solution.ground.as_ref().map(|plan| plan.cost);
     let context = Context::new(task, limits);
-    let bounds = || Some((Bounds::of_projections(context).ok()?, Scales::one()));
-    certified(context, (solution, cost), &Scales::one(), bounds, |bounds| bounds)
+    let bounds = || -> Result<_, NoCertificate> {
+        Ok((Bounds::of_projections(context).map_err(at_limit)?, Scales::one()))
+    };
+    certified(context, cost.as_ref(), &Scales::one(), bounds, |bounds| bounds)
 }
 
-/// Creates the certificate of a solution of a task in rationals, see [`certify`]. Also returns `None` if the
-/// numbers have no common denominator.
-pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> Option<Certificate> {
+/// Creates the certificate of a solution of a task in rationals, see [`certify`].
+///
+/// # Errors
+/// Returns the first reason in [`NoCertificate`] that applies.
+pub fn certify_exact(
+    task: &ExactTask,
+    solution: &Solution,
+    limits: &Limits,
+) -> Result<Certificate, NoCertificate> {
     let task = &task.0;
+    supported(task, solution)?;
     let context = Context::new(task, limits);
     let metric = solution.plan.as_ref().map(|plan| Rational::from_big(plan.cost.to_rational()));
     let cost =
         metric.map(|metric| if task.objective.maximize { -metric } else { metric } - &task.objective.offset);
     let scales = Scales::of(task, &Rational::one())?;
-    let bounds = || {
-        let bounds = RoundedBounds::of_projections(context).ok()?;
+    let bounds = || -> Result<_, NoCertificate> {
+        let bounds = RoundedBounds::of_projections(context).map_err(at_limit)?;
         let scales = Scales::of(task, &bounds.unit)?;
-        Some((bounds, scales))
+        Ok((bounds, scales))
     };
-    certified(context, (solution, cost), &scales, bounds, |rounded| &rounded.bounds)
+    certified(context, cost.as_ref(), &scales, bounds, |rounded| &rounded.bounds)
 }
 
-/// Writes the certificate of a solution. `bounds` computes a heuristic and the scales of its numbers, and `plain`
-/// returns the integer bounds in it. `scales` is used if grounding already proves that the task is unsolvable.
-/// Returns `None` in the cases that [`certify`] lists.
+fn at_limit(Interrupted: Interrupted) -> NoCertificate {
+    NoCertificate::Limit
+}
+
+/// Checks that the certificate can be about this solution of this task.
+fn supported<N: TaskNumber>(task: &Task<N>, solution: &Solution) -> Result<(), NoCertificate> {
+    if !matches!(solution.status, Status::Optimal | Status::Unsolvable) {
+        return Err(NoCertificate::Unproved);
+    }
+    if !task.others.is_empty() {
+        return Err(NoCertificate::SeveralObjectives);
+    }
+    // These fluents are evaluated in the last state.
+    let fluents = task.objective.rest.iter().map(|(fluent, _)| task.number_names[fluent.0 as usize].as_str());
+    let fluents: Vec<&str> = fluents.collect();
+    if !fluents.is_empty() {
+        return Err(NoCertificate::StateDependentMetric { fluents: fluents.join(" and ") });
+    }
+    match task.operators.iter().find(|operator| operator.cost.minimum() < N::zero()) {
+        Some(operator) => Err(NoCertificate::Improvement { action: action_name(task, operator) }),
+        None => Ok(()),
+    }
+}
+
+/// Writes the certificate of a solution with the ground cost `cost`. `bounds` computes a heuristic and the scales of its
+/// numbers, and `plain` returns the integer bounds in it. `scales` is used if grounding already proves that the task is
+/// unsolvable.
 fn certified<N: TaskNumber, E: Heuristic<N>>(
     context: Context<'_, N>,
-    (solution, cost): (&Solution, Option<N>),
+    cost: Option<&N>,
     scales: &Scales,
-    bounds: impl FnOnce() -> Option<(E, Scales)>,
+    bounds: impl FnOnce() -> Result<(E, Scales), NoCertificate>,
     plain: impl Fn(&E) -> &Bounds,
-) -> Option<Certificate> {
+) -> Result<Certificate, NoCertificate> {
     let task = context.task;
-    if !matches!(solution.status, Status::Optimal | Status::Unsolvable)
-        || !task.others.is_empty()
-        || task.operators.iter().any(|operator| operator.cost.minimum() < N::zero())
-    {
-        return None;
-    }
     if task.unreachable.is_some() {
         let argument = Argument { format: ARGUMENT_FORMAT.into(), ..Argument::default() };
-        return written(&model(task, scales), &argument);
+        return Ok(written(&model(task, scales), &argument));
     }
     let (bounds, scales) = bounds()?;
-    let labels = closed_labels(context, &bounds, cost.as_ref())?;
+    let labels = closed_labels(context, &bounds, cost)?;
     let label = |(values, numbers, cost): (Vec<u32>, Vec<N>, N)| {
         Label(values, integers(&numbers, &scales.numbers), scaled(&cost, &scales.costs))
     };
@@ -108,16 +137,17 @@ fn certified<N: TaskNumber, E: Heuristic<N>>(
         needs: plain(&bounds).needs().map(need).collect(),
         labels: labels.into_iter().map(label).collect(),
     };
-    written(&model(task, &scales), &argument)
+    Ok(written(&model(task, &scales), &argument))
 }
 
 fn integers<N: TaskNumber>(numbers: &[N], scale: &Integer) -> Vec<Integer> {
     numbers.iter().map(|number| scaled(number, scale)).collect()
 }
 
-fn written(task: &Model, argument: &Argument) -> Option<Certificate> {
-    let task = serde_json::to_string(task).ok()?;
-    Some(Certificate { task, argument: serde_json::to_string(argument).ok()? })
+fn written(task: &Model, argument: &Argument) -> Certificate {
+    let [task, argument] = [serde_json::to_string(task), serde_json::to_string(argument)]
+        .map(|text| text.expect("invariant: both documents have string keys only"));
+    Certificate { task, argument }
 }
 
 struct Pool<K, V> {

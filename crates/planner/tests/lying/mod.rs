@@ -46,7 +46,7 @@ fn certified(example: &Example) -> (Certificate, String) {
     let cost = cost.map(metaplan_planner::Exact::to_rational);
     assert_eq!(cost, example.optimum.map(fraction), "{}", example.name);
     let certificate = certify(&task, &solution, &Limits::none())
-        .unwrap_or_else(|| panic!("{}: no certificate", example.name));
+        .unwrap_or_else(|reason| panic!("{}: {reason}", example.name));
     let made = witness(&domain, &problem, &certificate.task, &|| false)
         .unwrap_or_else(|verdict| panic!("{}: {verdict:?}\n{}", example.name, certificate.task));
     (certificate, made)

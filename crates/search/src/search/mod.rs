@@ -22,6 +22,8 @@ pub use astar::{SearchOutcome, SearchProblem};
 pub use h2_mutexes::MutexPairs;
 pub use heuristic::Heuristic;
 pub use monotonicity::{Polarity, directions, is_monotone};
-pub use search_driver::{InterleavedSearch, STATE_LIMIT, closed_labels, search, search_from, search_states};
+pub use search_driver::{
+    InterleavedSearch, NoLabels, STATE_LIMIT, closed_labels, search, search_from, search_states,
+};
 pub use search_task::SearchTask;
 pub use statistics::SearchStatistics;

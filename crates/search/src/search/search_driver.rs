@@ -326,24 +326,43 @@ fn cheaper<N: Ord>(first: Option<GroundPlan<N>>, second: Option<GroundPlan<N>>) 
 /// A closed state: values of the basic variables, values of the numeric variables, and path cost.
 pub type ClosedEntry<N> = (Vec<u32>, Vec<N>, N);
 
+/// Reason why [`closed_labels`] has no result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoLabels {
+    /// A limit on time or memory was reached, or the run was interrupted.
+    Limit,
+    /// The search has stored more than [`STATE_LIMIT`] states.
+    States,
+    /// An operator, or all operators together, have too many combinations of designs.
+    Combinations,
+    /// The search has proved nothing, for example because a number became too large.
+    Inconclusive,
+}
+
 /// Runs an A\* search and returns the closed states whose f value (path cost plus heuristic value) is below
 /// `cost`, which must not exceed the cost of an optimal plan. If `cost` is `None`, no plan must exist, and
-/// all closed states are returned. Returns `None` if these conditions do not hold, or the search has no proof
-/// after `STATE_LIMIT` states.
+/// all closed states are returned.
+///
+/// # Errors
+/// These conditions do not hold, or the search has no proof after `STATE_LIMIT` states.
 pub fn closed_labels<N: TaskNumber>(
     context: Context<'_, N>,
     bounds: &impl Heuristic<N>,
     cost: Option<&N>,
-) -> Option<Vec<ClosedEntry<N>>> {
-    let prepared = SearchTask::new(context).ok()??;
+) -> Result<Vec<ClosedEntry<N>>, NoLabels> {
+    let prepared = SearchTask::new(context).map_err(|Interrupted| NoLabels::Limit)?;
+    let prepared = prepared.ok_or(NoLabels::Combinations)?;
     let task = context.task;
     let space = SearchProblem { context, bounds, prepared: &prepared, orbits: None };
     let polarities = uniform_directions(task);
     let mut search = AStar::with_polarities(&space, &task.initial, OpenListOrder::Fewest, None, polarities);
-    match (search.run_until_states(STATE_LIMIT, &mut |_, _| {})?, cost) {
-        (SearchOutcome::Optimal(plan), Some(cost)) if plan.cost >= *cost => {}
-        (SearchOutcome::None, None) => {}
-        _ => return None,
+    match (search.run_until_states(STATE_LIMIT, &mut |_, _| {}), cost) {
+        (Some(SearchOutcome::Optimal(plan)), Some(cost)) if plan.cost >= *cost => {}
+        (Some(SearchOutcome::None), None) => {}
+        (None, _) if search.store.len() > STATE_LIMIT => return Err(NoLabels::States),
+        (None, _) => return Err(NoLabels::Limit),
+        _ if search.is_interrupted() => return Err(NoLabels::Limit),
+        _ => return Err(NoLabels::Inconclusive),
     }
     let store = &search.store;
     let mut state = task.initial.clone();
@@ -355,7 +374,7 @@ pub fn closed_labels<N: TaskNumber>(
         is_below.then(|| (state.values[..task.basic].to_vec(), state.numbers.clone(), path_cost.clone()))
     };
     let nodes = (0..dense(store.len())).filter(|id| !store.is_dominated(*id));
-    Some(nodes.filter_map(label).collect())
+    Ok(nodes.filter_map(label).collect())
 }
 
 #[cfg(test)]

@@ -121,10 +121,16 @@ pub fn compile<'t>(
     }
     let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     if has_events && !used_preferences.is_empty() && matches!(course, PlanSemantics::Sequence) {
+        let objective =
+            objectives.iter().position(|metric| !preferences_in(std::slice::from_ref(metric)).is_empty());
+        let place = match objective {
+            Some(index) => (File::Objective(index), objectives[index].span),
+            None => (File::Problem, problem.metric.as_ref().map_or(problem.name.span, |metric| metric.span)),
+        };
         errors.push(unsupported(
             "a preference together with timed initial literals",
             "`--concurrent`, or preferences without timed initial literals",
-            (File::Problem, problem.metric.as_ref().map_or(problem.name.span, |metric| metric.span)),
+            place,
         ));
     }
     limits.check().map_err(|interrupted| vec![interrupted.into()])?;

@@ -26,7 +26,7 @@ use pddl::ast::Direction;
 /// task.
 ///
 /// # Errors
-/// A metric is not linear, reads a function without a value, or contains a fluent with state-dependent changes
+/// A metric is not linear, divides by 0, reads a function without a value, or contains a fluent with state-dependent changes
 /// although `generality` does not allow this. It is also an error if the deadline has passed or the run is
 /// interrupted.
 pub fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Result<(), Errors> {
@@ -146,8 +146,11 @@ fn split(
             let (mut linear, time) = split(world, left, *place)?;
             let (divisor, divisor_time) = split(world, right, *place)?;
             let constant = divisor.quantity.constant.clone();
-            if !divisor.coefficients.is_empty() || !divisor_time.is_zero() || constant.is_zero() {
+            if !divisor.coefficients.is_empty() || !divisor_time.is_zero() {
                 return Err(Error::NonLinear { place: *place });
+            }
+            if constant.is_zero() {
+                return Err(Error::ZeroDivisor { place: *place });
             }
             linear.scale(&constant.recip());
             Ok((linear, time / constant))

@@ -54,12 +54,15 @@ fn named(
     objectives: &[ast::Metric],
 ) -> Result<Lifted, Errors> {
     let written = if objectives.is_empty() { problem.metric.as_slice() } else { objectives };
-    let metrics: Vec<_> = written
-        .iter()
-        .map(|metric| Metric {
-            direction: metric.direction,
-            expression: condition::expression(&mut names, &metric.expression, &mut Scope::new(File::Problem)),
-            place: Place { file: File::Problem, span: metric.span },
+    let metrics: Vec<_> = (0..)
+        .zip(written)
+        .map(|(index, metric)| {
+            let file = if objectives.is_empty() { File::Problem } else { File::Objective(index) };
+            Metric {
+                direction: metric.direction,
+                expression: condition::expression(&mut names, &metric.expression, &mut Scope::new(file)),
+                place: Place { file, span: metric.span },
+            }
         })
         .collect();
     let has_events = problem.init.iter().any(|element| matches!(element, ast::InitialElement::Timed(..)));

@@ -4,7 +4,7 @@ use num_bigint::BigInt;
 use num_integer::Integer as _;
 use num_rational::BigRational;
 use pddl::ast::Direction;
-use task::error::Error;
+use task::error::{Error, Place};
 use task::lifted::{Expression, Metric, Rational};
 use task::normalize::duration::time_factor;
 use task::number::Int;
@@ -71,12 +71,38 @@ impl<T: TimeNumber> Measure<T> {
 }
 
 /// Splits a metric into the weight of the makespan in the minimised metric and the metric without
-/// `total-time`. Returns `None` if the metric is not linear in time or rewards a longer makespan.
-pub(super) fn split(metric: &Metric) -> Option<(Rational, Metric)> {
-    let factor = time_factor(&metric.expression)?;
+/// `total-time`.
+///
+/// # Errors
+/// The metric has the divisor 0, is not linear in time, or rewards a longer makespan.
+pub(super) fn split(metric: &Metric) -> Result<(Rational, Metric), Error> {
+    let unsupported = || Error::Unsupported {
+        construct: "a metric that rewards time, or is not linear in it, where actions overlap".into(),
+        instead: "a metric that grows with `total-time`, or does not mention it".into(),
+        place: metric.place,
+    };
+    if let Some(place) = zero_divisor(&metric.expression) {
+        return Err(Error::ZeroDivisor { place });
+    }
+    let factor = time_factor(&metric.expression).ok_or_else(unsupported)?;
     let weight = if metric.direction == Direction::Minimize { factor } else { -factor };
-    let cost_metric = Metric { expression: without_time(&metric.expression), ..metric.clone() };
-    (!weight.is_negative()).then_some((weight, cost_metric))
+    if weight.is_negative() {
+        return Err(unsupported());
+    }
+    Ok((weight, Metric { expression: without_time(&metric.expression), ..metric.clone() }))
+}
+
+/// Returns the source location of a quotient whose divisor is the number 0.
+fn zero_divisor(expression: &Expression) -> Option<Place> {
+    match expression {
+        Expression::Quotient(left, right, place) => match &**right {
+            Expression::Number(number) if *number == Rational::from_integer(0) => Some(*place),
+            _ => zero_divisor(left).or_else(|| zero_divisor(right)),
+        },
+        Expression::Sum(parts) | Expression::Product(parts, _) => parts.iter().find_map(zero_divisor),
+        Expression::Negate(inner) => zero_divisor(inner),
+        Expression::TotalTime | Expression::Number(_) | Expression::Function(..) => None,
+    }
 }
 
 fn without_time(expression: &Expression) -> Expression {

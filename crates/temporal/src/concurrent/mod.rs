@@ -204,13 +204,7 @@ fn ground_normal(
     let place = Place { file: File::Problem, span: Span::default() };
     let number = |number| Expression::Number(Rational::from_integer(number));
     let (weight, metric) = match lifted.metrics.first() {
-        Some(metric) => measure::split(metric).ok_or_else(|| {
-            vec![Error::Unsupported {
-                construct: "a metric that rewards time, or is not linear in it, where actions overlap".into(),
-                instead: "a metric that grows with `total-time`, or does not mention it".into(),
-                place: metric.place,
-            }]
-        })?,
+        Some(metric) => measure::split(metric)?,
         None => (
             Rational::from_integer(1),
             Metric { direction: Direction::Minimize, expression: number(0), place },

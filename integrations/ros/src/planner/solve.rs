@@ -170,7 +170,7 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
     let (mut problem, mut warnings) = mission.filled().map_err(NoPlan::Input)?;
     warnings.extend(mission.warnings().cloned());
     if let (Some(metric), None) = (&manner.metric, &problem.metric) {
-        problem.metric = Some(mission.objective(&problem, metric).map_err(NoPlan::Input)?);
+        problem.metric = Some(mission.objective(&problem, metric).map_err(NoPlan::Input)?.metric);
     }
     let durative = |body: &ActionBody| matches!(body, ActionBody::Durative { .. });
     let is_durative = mission.domain().actions.iter().any(|action| durative(&action.body));

@@ -13,9 +13,23 @@ use crate::task::number::TaskNumber;
 use crate::task::quantity::Quantity;
 use crate::task::table_map::TableMap;
 
+/// The quantity that contains numbers, for the error that a number is too large.
+#[derive(Debug, Clone, Copy)]
+struct Origin {
+    what: &'static str,
+    /// Source location of the objective, if the quantity is one.
+    place: Option<Place>,
+}
+
+impl Origin {
+    fn overflow(self) -> Error {
+        Error::Overflow { what: self.what.to_owned(), place: self.place }
+    }
+}
+
 #[derive(Debug)]
 pub(super) struct Denominator {
-    what: &'static str,
+    origin: Origin,
     /// Least common denominator of the visited numbers; `None` on overflow.
     common: Option<Int>,
     culprit: Option<(String, Option<Place>)>,
@@ -25,7 +39,16 @@ pub(super) struct Denominator {
 
 impl Denominator {
     pub(super) fn new(what: &'static str) -> Self {
-        Self { what, common: Some(1), culprit: None, seen: FxHashMap::default() }
+        Self::of(Origin { what, place: None })
+    }
+
+    /// Returns the common denominator of the numbers of an objective at `place`, which replaces the metric.
+    pub(super) fn of_objective(place: Place) -> Self {
+        Self::of(Origin { what: "the objective", place: Some(place) })
+    }
+
+    fn of(origin: Origin) -> Self {
+        Self { origin, common: Some(1), culprit: None, seen: FxHashMap::default() }
     }
 
     pub(super) fn number(&mut self, number: &Rational) {
@@ -59,35 +82,35 @@ impl Denominator {
     pub(super) fn integers<N: TaskNumber>(self) -> Result<Integers<N>, Error> {
         let common = if N::SCALED { self.common } else { Some(1) };
         let overflow = || {
-            let error = Error::overflow(self.what);
+            let error = self.origin.overflow();
             self.culprit.iter().fold(error, |error, (name, place)| error.within(name, *place))
         };
         let scale = common.ok_or_else(overflow)?;
-        Ok(Integers { what: self.what, scale, tables: TableMap::default() })
+        Ok(Integers { origin: self.origin, scale, tables: TableMap::default() })
     }
 }
 
 #[derive(Debug)]
 pub(super) struct Integers<N> {
-    what: &'static str,
+    origin: Origin,
     pub(super) scale: Int,
     tables: TableMap<N>,
 }
 
 impl<N: TaskNumber> Integers<N> {
     pub(super) fn number(&self, number: &Rational) -> Result<N, Error> {
-        integer(number, self.scale, self.what)
+        integer(number, self.scale, self.origin)
     }
 
     pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) -> Result<Quantity<N>, Error> {
-        let (scale, what) = (self.scale, self.what);
-        let scaled = self.tables.map(quantity, &|number| integer(number, scale, what))?;
-        if N::fits(&scaled) { Ok(scaled) } else { Err(Error::overflow(what)) }
+        let (scale, origin) = (self.scale, self.origin);
+        let scaled = self.tables.map(quantity, &|number| integer(number, scale, origin))?;
+        if N::fits(&scaled) { Ok(scaled) } else { Err(origin.overflow()) }
     }
 }
 
-fn integer<N: TaskNumber>(number: &Rational, scale: Int, what: &str) -> Result<N, Error> {
-    N::from_rational(number, scale).ok_or_else(|| Error::overflow(what))
+fn integer<N: TaskNumber>(number: &Rational, scale: Int, origin: Origin) -> Result<N, Error> {
+    N::from_rational(number, scale).ok_or_else(|| origin.overflow())
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use std::hash::BuildHasher;
 use rustc_hash::{FxBuildHasher, FxHashMap};
 use smallvec::SmallVec;
 
-use crate::error::{Error, Place};
+use crate::error::{Error, File, Place};
 use crate::ground::config::Generality;
 use crate::ground::finalize::conditions::{axioms, condition, contradictory};
 use crate::ground::finalize::integers::{Denominator, Integers};
@@ -168,15 +168,23 @@ fn objectives<N: TaskNumber>(
 ) -> Result<(Vec<Objective<N>>, Vec<Integers<N>>), Error> {
     let (mut objectives, mut conversions) = (Vec::new(), Vec::new());
     for (objective, position) in task.objectives.iter().zip(0..) {
-        let mut denominator = Denominator::new("the metric");
+        let place = task.world.lifted.metrics.get(position).map(|metric| metric.place);
+        let mut denominator = match place {
+            Some(place @ Place { file: File::Objective(_), .. }) => Denominator::of_objective(place),
+            _ => Denominator::new("the metric"),
+        };
+        let at_start = || ("its value at the start".to_owned(), place);
         denominator.number(&objective.offset);
-        denominator.note(|| ("its value at the start".to_owned(), None));
+        denominator.note(at_start);
         for operator in &task.operators {
             denominator.quantity(&operator.costs[position]);
             denominator.note(|| schema_name(task.world.lifted, operator));
         }
         let integers = denominator.integers()?;
-        let offset = integers.number(&objective.offset)?;
+        let offset = integers.number(&objective.offset).map_err(|error| {
+            let (name, place) = at_start();
+            error.within(&name, place)
+        })?;
         let remaining = numbers.rest(&objective.rest);
         objectives.push(Objective {
             scale: integers.scale,
