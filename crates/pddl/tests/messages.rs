@@ -42,8 +42,8 @@ fn names_in_another_encoding_are_refused() {
         render(&diagnostics, &[&domain, &problem], false)
     };
     assert_eq!(messages(&[b"; caf\xe9\n", PROBLEM.as_bytes()].concat()), "");
-    let latin_1 = PROBLEM.replace("a b - place", "a\u{e8} a\u{e9} - place").chars().map(|c| c as u8);
-    let text = messages(&latin_1.collect::<Vec<_>>());
+    let problem = PROBLEM.replace("a b - place", "a\u{e8} a\u{e9} - place");
+    let text = messages(&problem.chars().map(|c| c as u8).collect::<Vec<_>>());
     assert!(text.starts_with("error[P106]"), "{text}");
     assert!(text.contains("problem.pddl:3:13") && text.contains("convert the file to UTF-8"), "{text}");
 }

@@ -214,7 +214,7 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
             tally.fail(case, "a front is wrong", &format!("{}: {points:?}, not {pairs:?}", description()));
         }
         if let (Status::Optimal, [first, second, ..]) = (computed.status, &metrics[..]) {
-            let objectives = [first.clone(), second.clone()];
+            let objectives = [first, second].map(|objective| objective.metric.clone());
             let front = (&computed.points[..], is_wrong);
             certify::check_front(case, (&mission, &problem), &objectives, front, tally);
         }

@@ -1,11 +1,12 @@
 //! Performer that sets the design of a function by the service `/<function>/change_mode` of
 //! `system_modes`.
 
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::interfaces::system_modes_msgs::srv::{ChangeMode as Service, ChangeModeRequest};
-use crate::node::Node;
+use crate::node::{Caller, Node};
 use crate::perform::{Call, End, Perform, Running};
 use crate::performer::action::SERVER_TIMEOUT;
 use crate::performer::settings::argument;
@@ -18,6 +19,9 @@ pub(super) struct ChangeMode {
     node: Arc<Node>,
     function: Option<NonZeroUsize>,
     design: Option<NonZeroUsize>,
+    /// Clients of the functions that actions have named. A new client for each action could receive no reply: the
+    /// server matches it only after some time.
+    callers: Mutex<BTreeMap<String, Arc<Caller<Service>>>>,
 }
 
 impl ChangeMode {
@@ -26,7 +30,13 @@ impl ChangeMode {
         function: Option<NonZeroUsize>,
         design: Option<NonZeroUsize>,
     ) -> Self {
-        Self { node: Arc::clone(node), function, design }
+        Self { node: Arc::clone(node), function, design, callers: Mutex::default() }
+    }
+
+    fn caller(&self, function: &str) -> Arc<Caller<Service>> {
+        let mut callers = self.callers.lock().unwrap_or_else(PoisonError::into_inner);
+        let new = || Arc::new(self.node.caller::<Service>(&format!("/{function}/change_mode")));
+        Arc::clone(callers.entry(function.to_owned()).or_insert_with(new))
     }
 }
 
@@ -37,7 +47,7 @@ impl Perform for ChangeMode {
         let design = argument(&call.arguments, self.design, 0);
         match (function, design) {
             (Ok(function), Ok(design)) => {
-                let caller = self.node.caller::<Service>(&format!("/{function}/change_mode"));
+                let caller = self.caller(function);
                 let request = ChangeModeRequest { mode_name: design.to_owned() };
                 smol::spawn(async move {
                     let end = match caller.call(request, SERVER_TIMEOUT).await {
