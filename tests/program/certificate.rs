@@ -558,16 +558,6 @@ fn only_the_reason_that_applies_is_reported() {
         "the comparison of the task with the files does not cover (reach c), which depends on itself and is not a \
          variable of the task; it occurs in (look)",
     );
-    // The idle action compares a number that has no value in the condition of its effect.
-    check(
-        "(:predicates (done) (seen)) (:functions (level))
-          (:action look :parameters () :precondition () :effect (when (> (level) 1) (seen)))
-          (:action work :parameters () :precondition () :effect (done))",
-        "(:init) (:goal (done))",
-        &[],
-        "the comparison of the task with the files does not cover a comparison without a value in `when`; it occurs \
-         in (look)",
-    );
 }
 
 /// A conflict between a conditional and an unconditional start effect excludes only the case in

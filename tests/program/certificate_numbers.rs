@@ -36,7 +36,7 @@ fn plans_found_in_fractions_have_certificates() {
         assert!(planned.stdout.contains("optimal, proved"), "{planned:#?}");
         if !covered {
             assert_eq!(planned.status, 3, "{planned:#?}");
-            assert!(planned.stderr.contains("numbers that are multiplied by fractions"), "{planned:#?}");
+            assert!(planned.stderr.contains("`rest` multiplies a number by a fraction"), "{planned:#?}");
             continue;
         }
         assert_eq!(planned.status, 0, "{planned:#?}");
