@@ -8,7 +8,7 @@ use std::time::Duration;
 use metaplan::mapek::{Answer, Baseline, Loop, Observation, Thinker, Thoughts};
 use serde_json::Value;
 
-use crate::ids::Ids;
+use crate::ids::{Ids, Membership};
 use crate::missions::{Missions, Template};
 use crate::store::Stored;
 use crate::wire::{Decided, FORMAT, Migration, SafePoint, State};
@@ -62,6 +62,9 @@ pub enum Refused {
     Misplaced,
     /// An event with the same message id was decided before.
     Repeated,
+    /// The number of the message id lies between numbers of decided events that are so low that the numbers between them
+    /// are not stored.
+    Late,
 }
 
 impl Refused {
@@ -75,6 +78,7 @@ impl Refused {
             Self::Forged => "forged_id",
             Self::Misplaced => "wrong_partition",
             Self::Repeated => "repeated_id",
+            Self::Late => "late_id",
         }
     }
 
@@ -92,6 +96,10 @@ impl Refused {
             Self::Forged => "the message id must be that of its robot: `ROBOT:NUMBER`",
             Self::Misplaced => "the robot belongs to another partition",
             Self::Repeated => "an event with this message id was decided before",
+            Self::Late => {
+                "the event is too late: so many events with higher numbers were decided before it that whether it was \
+                 decided, too, is not stored"
+            }
         }
     }
 }
@@ -165,8 +173,10 @@ impl Robot {
     /// # Errors
     /// As for [`Robot::decide`].
     pub fn begin(&mut self, event: &Stored, missions: &Missions) -> Result<Begun, Faulted> {
-        if event.id.as_ref().is_some_and(|id| self.ids.contains(id)) {
-            return Ok(Begun::Refused(Refused::Repeated));
+        match event.id.as_ref().map(|id| self.ids.membership(id)) {
+            Some(Membership::Present) => return Ok(Begun::Refused(Refused::Repeated)),
+            Some(Membership::Unclear) => return Ok(Begun::Refused(Refused::Late)),
+            Some(Membership::Absent) | None => {}
         }
         let text = String::from_utf8_lossy(&event.payload);
         let head: Value = serde_json::from_str(&text).unwrap_or_default();
@@ -320,7 +330,9 @@ impl Robot {
     fn complete(&mut self, search: Search) -> Decided {
         let Search { mut decided, answers, id } = search;
         (self.event, self.now) = (decided.event, decided.now);
-        self.ids.extend(id.as_deref());
+        if let Some(id) = &id {
+            self.ids.insert(id);
+        }
         let mut snapshot = Value::Null;
         if let Control::Loaded(control, baseline) = &mut self.control {
             decided.answers = control.decision(&answers).answers;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::ids::Membership;
 use crate::partition::{pause, persist};
 use crate::store::{Fault, Message, Receipt, Store, Stream};
 use crate::wire::{Address, Decided, Presence};
@@ -72,7 +73,8 @@ impl<S: Store> Sender<S> {
             return stored.subject == subject && stored.payload == event.as_bytes();
         }
         let last = persist(|| self.store.last(Stream::Decisions, subject)).await;
-        last.and_then(|last| Decided::parse(&last.payload)).is_some_and(|last| last.state.ids.contains(id))
+        last.and_then(|last| Decided::parse(&last.payload))
+            .is_some_and(|last| last.state.ids.membership(id) != Membership::Absent)
     }
 }
 

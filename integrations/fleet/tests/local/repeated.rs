@@ -1,11 +1,12 @@
 //! Tests of messages that are sent again after the log has forgotten their ids, because the events are discarded.
 
 use metaplan_fleet::partition::Settings;
+use metaplan_fleet::robot::{Refused, Robot};
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Message, Store, Stream};
-use metaplan_fleet::wire::Address;
+use metaplan_fleet::store::{Message, Store, Stored, Stream};
+use metaplan_fleet::wire::{Address, Decided};
 
-use super::{assert_same, decisions, heard, open, scripts, work};
+use super::{assert_same, decisions, heard, missions, open, scripts, work};
 
 /// Sends events of the robot `r` with the ids of their numbers.
 async fn send(store: &Local, events: &[(usize, &str)]) -> Vec<u64> {
@@ -52,4 +53,30 @@ async fn an_event_is_decided_once_though_the_log_has_forgotten_its_id() {
         assert!(reason.contains("decided before"), "{reason}");
     }
     assert!(notices.try_recv().is_err(), "there are no further refusals");
+}
+
+#[test]
+fn an_event_is_decided_once_or_refused_as_late_after_a_restart() {
+    let (missions, mut last, mut sequence) = (missions(), None::<Decided>, 0);
+    let mut decide = |id: &str, event: &str| {
+        sequence += 1;
+        let mut robot = last.clone().map_or_else(Robot::default, Robot::restore);
+        let (subject, id, payload) = ("0.r".to_owned(), Some(id.to_owned()), event.as_bytes().to_vec());
+        let event = Stored { sequence, subject, id, time: sequence, payload };
+        let outcome = robot.decide(&event, &missions).expect("the state fits the mission");
+        outcome.map(|decided| last = Some(decided))
+    };
+    let tick = r#"{"event": "tick"}"#;
+    let long = format!("r:{}", "x".repeat(200));
+    assert_eq!(decide(&format!("{long}1"), r#"{"event": "enrol", "mission": "ugv"}"#), Ok(()));
+    assert_eq!(decide(&format!("{long}1"), tick), Err(Refused::Repeated));
+    assert_eq!(decide(&format!("{long}2"), tick), Ok(()));
+    // 17 ranges, of which the two lowest ones are merged to 0..=2.
+    for number in (0..=32).step_by(2) {
+        assert_eq!(decide(&format!("r:{number}"), tick), Ok(()));
+    }
+    assert_eq!(decide("r:1", tick), Err(Refused::Late));
+    assert_eq!(decide("r:2", tick), Err(Refused::Late));
+    assert_eq!(decide("r:4", tick), Err(Refused::Repeated));
+    assert_eq!(decide("r:3", tick), Ok(()));
 }
