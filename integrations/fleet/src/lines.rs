@@ -15,7 +15,7 @@ use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::{Fault, Store, Stored, Stream};
 use metaplan_fleet::wire::{Address, Decided, is_name};
 use metaplan_fleet::worker;
-use serde_json::{Value, json};
+use serde_json::{Map, Value};
 use tokio::io::{AsyncBufReadExt as _, BufReader, stdin};
 use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{mpsc, watch};
@@ -125,25 +125,11 @@ pub(crate) async fn send<S: Store>(store: S, session: &str) -> Result<(), Messag
 /// `None` for other messages.
 fn line(message: &Stored) -> Option<(String, String)> {
     let address = Address::parse(&message.subject)?;
-    let decided = Decided::parse(&message.payload)?;
-    let mut line = json!({"decision": message.sequence, "event": decided.event, "answers": decided.answers});
-    if let (Some(mission), Some(object)) = (decided.enrolled, line.as_object_mut()) {
-        object.insert("enrolled".to_owned(), Value::String(mission));
-    }
-    let Decided { migrated, retired, planning, planned, late, .. } = decided;
-    let flags = [
-        ("migrated", migrated),
-        ("retired", retired),
-        ("planning", planning),
-        ("planned", planned),
-        ("late", late),
-    ];
-    for (name, flag) in flags {
-        if let (true, Some(object)) = (flag, line.as_object_mut()) {
-            object.insert(name.to_owned(), Value::Bool(true));
-        }
-    }
-    Some((address.robot, line.to_string()))
+    Decided::parse(&message.payload)?;
+    let mut line: Map<String, Value> = serde_json::from_slice(&message.payload).ok()?;
+    line.retain(|name, _| !["format", "now", "worker", "state"].contains(&name.as_str()));
+    line.shift_insert(0, "decision".to_owned(), message.sequence.into());
+    Some((address.robot, Value::Object(line).to_string()))
 }
 
 /// Writes the decisions of one robot to standard output, or those of all robots if `robot` is

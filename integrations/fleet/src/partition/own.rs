@@ -265,7 +265,7 @@ impl<S: Store> Partition<S> {
         }
         // A robot that is not enrolled, or not loaded, needs no memory after its events are discarded.
         if let Some(slot) = self.slots.get(&robot).filter(|slot| slot.is_idle()) {
-            let is_unknown = slot.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission.is_none());
+            let is_unknown = slot.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission().is_none());
             if slot.obsolete == 0 && (is_unknown || slot.loaded.is_none()) {
                 self.count_loaded(&robot, false);
                 self.slots.remove(&robot);
@@ -428,7 +428,7 @@ impl<S: Store> Partition<S> {
 
     /// Counts a refused event, and publishes the reason as a notice to the clients of the robot.
     fn say(&self, subject: String, refused: Refused) {
-        self.refuse(Some((subject, refused.sentence().to_owned())), refused.name());
+        self.refuse(Some((subject, refused.to_string())), refused.name());
     }
 
     fn refuse(&self, notice: Option<(String, String)>, reason: &'static str) {

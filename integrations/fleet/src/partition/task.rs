@@ -181,7 +181,7 @@ impl Task {
 
     fn planning<S: Store>(&self, shared: &Arc<Shared<S>>, robot: &Robot, thinker: Thinker) -> Planning {
         let (shared, estimate) = (Arc::clone(shared), self.estimate);
-        let mission = robot.mission.clone().unwrap_or_default();
+        let mission = robot.mission().unwrap_or_default().to_owned();
         let (search, own) = (thinker.handle(), Arc::clone(&shared));
         let think = move || {
             let begun = Instant::now();
