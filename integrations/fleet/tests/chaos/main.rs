@@ -68,8 +68,8 @@ fn scripts(count: usize, lines: usize) -> Vec<Script> {
 async fn begin(seed: u64, workers: usize, lease: u64) -> (Cluster, Nats) {
     let cluster = Cluster::begin(seed);
     let access = Access { url: cluster.url(), ..Access::default() };
-    let (fleet, duration) = ("fleet".to_owned(), Duration::from_secs(lease));
-    let layout = Layout { fleet, partitions: PARTITIONS, replicas: 3, history: -1, lease: duration };
+    let fleet = "fleet".to_owned();
+    let layout = Layout { fleet, partitions: PARTITIONS, replicas: 3, history: -1, lease };
     let store = match Nats::open(&access, &layout, Duration::from_secs(60)).await {
         Ok(store) => store,
         Err(error) => panic!("the servers do not answer: {}: {}", error.message, cluster.logs()),
