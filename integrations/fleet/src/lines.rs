@@ -1,6 +1,7 @@
 //! Standard input and output of the program: lines with events and decisions.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::io::{self, Write as _};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -12,8 +13,8 @@ use metaplan::message::Message;
 use metaplan_fleet::partition::Shared;
 use metaplan_fleet::robots::{Sender, Status};
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Fault, Store, Stored, Stream};
-use metaplan_fleet::wire::{Address, Decided, is_name};
+use metaplan_fleet::store::{Store, Stored, Stream};
+use metaplan_fleet::wire::{Address, Decided, Presence, is_name};
 use metaplan_fleet::worker;
 use serde_json::{Map, Value};
 use tokio::io::{AsyncBufReadExt as _, BufReader, stdin};
@@ -23,12 +24,20 @@ use tokio::sync::{mpsc, watch};
 /// Maximum number of input lines of a robot that are read but not stored.
 const AHEAD: usize = 1024;
 
-fn fault(fault: &Fault) -> Message {
+fn fault(fault: impl Display) -> Message {
     Message::error("N312", format!("the log cannot be used: {fault}"))
 }
 
-fn unwritten(error: &io::Error) -> Message {
+fn unwritten(error: impl Display) -> Message {
     Message::error("N313", format!("standard output cannot be written: {error}"))
+}
+
+fn unparsed(text: impl Display) -> Message {
+    Message::error("N314", text.to_string())
+}
+
+fn unstored(text: impl Display) -> Message {
+    Message::error("N315", text.to_string())
 }
 
 /// Reads lines `ROBOT EVENT` from standard input until the end of input or until `stop` becomes true,
@@ -45,10 +54,8 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
             line = lines.next_segment() => line,
             _ = stop.changed() => break,
         };
-        let Some(line) = line.map_err(|error| Message::error("N314", format!("standard input: {error}")))?
-        else {
-            break;
-        };
+        let line = line.map_err(|error| unparsed(format_args!("standard input: {error}")))?;
+        let Some(line) = line else { break };
         number += 1;
         let line = String::from_utf8_lossy(&line).trim_start_matches('\u{feff}').trim().to_owned();
         if line.is_empty() {
@@ -56,59 +63,50 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
         }
         let Some((robot, event)) = line.split_once(' ').filter(|(robot, _)| is_name(robot)) else {
             wrong += 1;
-            let text = format!(
+            say(&unparsed(format_args!(
                 "line {number}: a line is `ROBOT EVENT`; a robot's name has letters, digits, `-` and `_` only"
-            );
-            say(&Message::error("N314", text));
+            )));
             continue;
         };
-        if !robots.contains_key(robot) {
-            let (tell, mut told) = mpsc::channel::<(u64, String)>(AHEAD);
-            let mut sender = Sender::new(store.clone(), robot, session);
-            senders.spawn(async move {
-                let (mut stored, mut lost) = (0_u64, 0_u64);
-                while let Some((number, event)) = told.recv().await {
-                    match sender.send(&event).await {
-                        Ok(_) => stored += 1,
-                        Err(own) => {
-                            lost += 1;
-                            let robot = &sender.address().robot;
-                            say(&unstored(format!("line {number}, robot `{robot}`: {own}")));
-                        }
-                    }
-                }
-                (stored, lost)
-            });
-            robots.insert(robot.to_owned(), tell);
-        }
-        if let Some(tell) = robots.get(robot) {
-            // The receiving task ends only after this channel is closed.
-            let _ = tell.send((number, event.to_owned())).await;
-        }
+        let queue = robots.entry(robot.to_owned()).or_insert_with_key(|robot| {
+            let (queue, events) = mpsc::channel(AHEAD);
+            senders.spawn(send_all(Sender::new(store.clone(), robot, session), events));
+            queue
+        });
+        // The receiving task ends only after this channel is closed.
+        let _ = queue.send((number, event.to_owned())).await;
     }
     drop(robots);
     let (mut stored, mut lost) = (0, 0);
     while let Some(counts) = senders.join_next().await {
-        let counts = counts.map_err(|error| unstored(format!("a sender has failed: {error}")))?;
+        let counts = counts.map_err(|error| unstored(format_args!("a sender has failed: {error}")))?;
         (stored, lost) = (stored + counts.0, lost + counts.1);
     }
     match (wrong, lost) {
         (0, 0) => Ok(()),
         (_, 0) => {
-            let text = format!("{wrong} lines could not be parsed; {stored} events were stored");
-            Err(Message::error("N314", text))
+            Err(unparsed(format_args!("{wrong} lines could not be parsed; {stored} events were stored")))
         }
-        _ => {
-            let text = format!(
-                "{lost} events were not stored, {wrong} lines could not be parsed; {stored} events were stored"
-            );
-            Err(unstored(text))
-        }
+        _ => Err(unstored(format_args!(
+            "{lost} events were not stored, {wrong} lines could not be parsed; {stored} events were stored"
+        ))),
     }
 }
 
-fn unstored(text: String) -> Message {
-    Message::error("N315", text)
+/// Sends the events of a robot, which have the numbers of their lines. Prints errors, and returns the numbers of
+/// events that were stored and that were not.
+async fn send_all<S: Store>(mut sender: Sender<S>, mut events: mpsc::Receiver<(u64, String)>) -> (u64, u64) {
+    let (mut stored, mut lost) = (0, 0);
+    while let Some((number, event)) = events.recv().await {
+        if let Err(fault) = sender.send(&event).await {
+            lost += 1;
+            let robot = &sender.address().robot;
+            say(&unstored(format_args!("line {number}, robot `{robot}`: {fault}")));
+        } else {
+            stored += 1;
+        }
+    }
+    (stored, lost)
 }
 
 #[expect(clippy::print_stderr, reason = "it is said while the program goes on")]
@@ -159,7 +157,7 @@ async fn beginning<S: Store>(
     for partition in partitions {
         let start = match after {
             Some(after) => after,
-            None => store.end(Stream::Decisions, partition).await.map_err(|start| fault(&start))?,
+            None => store.end(Stream::Decisions, partition).await.map_err(fault)?,
         };
         reached.insert(partition, start);
     }
@@ -177,8 +175,7 @@ async fn write_decisions<S: Store>(
         let from = reached.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let mut streams = Vec::new();
         for (partition, after) in from {
-            let stream =
-                store.follow(Stream::Decisions, partition, after).await.map_err(|own| fault(&own))?;
+            let stream = store.follow(Stream::Decisions, partition, after).await.map_err(fault)?;
             streams.push(stream.map(move |message| (partition, message)).boxed());
         }
         let mut decisions = select_all(streams);
@@ -191,7 +188,7 @@ async fn write_decisions<S: Store>(
                 let mut out = io::stdout().lock();
                 match writeln!(out, "{name} {text}").and_then(|()| out.flush()) {
                     Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
-                    other => other.map_err(|error| unwritten(&error))?,
+                    other => other.map_err(unwritten)?,
                 }
             }
             let mut reached = reached.lock().unwrap_or_else(PoisonError::into_inner);
@@ -260,13 +257,12 @@ fn warning(received: Result<(String, String), RecvError>) -> Option<Message> {
 
 /// Returns `true` if all stored events are decided, refused, or of a suspended robot, and all decisions are written.
 async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) -> Result<bool, Message> {
-    let store = &shared.store;
-    for partition in 0..store.partitions() {
-        let at = |all: &Mutex<BTreeMap<u32, u64>>| {
-            all.lock().unwrap_or_else(PoisonError::into_inner).get(&partition).copied().unwrap_or_default()
-        };
-        for (stream, all) in [(Stream::Events, &shared.counts.reached), (Stream::Decisions, written)] {
-            if store.end(stream, partition).await.map_err(|own| fault(&own))? > at(all) {
+    // Events come first: their decisions are stored when they are decided.
+    for (stream, positions) in [(Stream::Events, &shared.counts.reached), (Stream::Decisions, written)] {
+        for partition in 0..shared.store.partitions() {
+            let end = shared.store.end(stream, partition).await.map_err(fault)?;
+            let positions = positions.lock().unwrap_or_else(PoisonError::into_inner);
+            if positions.get(&partition).copied().unwrap_or_default() < end {
                 return Ok(false);
             }
         }
@@ -280,44 +276,32 @@ pub(crate) fn status(status: &Status, as_json: bool) -> Result<(), Message> {
     } else {
         status_text(status)
     };
-    io::stdout().write_all(text.as_bytes()).map_err(|error| unwritten(&error))
+    io::stdout().write_all(text.as_bytes()).map_err(unwritten)
 }
 
 fn status_text(status: &Status) -> String {
-    let mut workers = Table::new();
-    workers.load_style(TableStyle::new()).set_header([
-        "worker",
-        "partitions",
-        "robots",
-        "waiting",
-        "decided",
-        "refused",
-        "load",
-        "",
-    ]);
-    for (name, own) in &status.workers {
-        workers.add_row([
-            name.clone(),
-            own.partitions.to_string(),
-            own.robots.to_string(),
-            own.waiting.to_string(),
-            own.decided.to_string(),
-            own.refused.to_string(),
-            format!("{:.0} %", own.load * 100.0),
-            if own.draining { "is ending".to_owned() } else { String::new() },
-        ]);
-    }
-    let mut partitions = Table::new();
-    partitions.load_style(TableStyle::new()).set_header(["partition", "worker"]);
-    for own in &status.partitions {
-        partitions
-            .add_row([own.partition.to_string(), own.worker.clone().unwrap_or_else(|| "nobody".to_owned())]);
-    }
-    for table in [&mut workers, &mut partitions] {
+    let table = |header: &[&str], rows: Vec<Vec<String>>| {
+        let mut table = Table::new();
+        table.load_style(TableStyle::new()).set_header(header).add_rows(rows);
         for column in table.column_iter_mut().skip(1) {
             column.set_cell_alignment(CellAlignment::Right);
         }
-    }
+        table
+    };
+    let workers = status.workers.iter().map(|(name, worker)| {
+        let Presence { partitions, robots, waiting, decided, refused, load, draining } = worker;
+        let counts = [&u64::from(*partitions), robots, waiting, decided, refused].map(u64::to_string);
+        let load = format!("{:.0} %", load * 100.0);
+        let is_ending = if *draining { "is ending" } else { "" };
+        [vec![name.clone()], counts.to_vec(), vec![load, is_ending.to_owned()]].concat()
+    });
+    let header = ["worker", "partitions", "robots", "waiting", "decided", "refused", "load", ""];
+    let workers = table(&header, workers.collect());
+    let partitions = status.partitions.iter().map(|partition| {
+        let worker = partition.worker.as_deref().unwrap_or("nobody");
+        vec![partition.partition.to_string(), worker.to_owned()]
+    });
+    let partitions = table(&["partition", "worker"], partitions.collect());
     format!("{workers}\n\n{partitions}\n")
 }
 
