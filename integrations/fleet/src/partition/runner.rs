@@ -244,8 +244,8 @@ impl<S: Store> Runner<S> {
             && !patience.is_zero()
             && let Ok(plans) = tokio::time::timeout(patience, plans).await
         {
-            let (found, estimate) = plans.ok_or_else(|| Outcome::Faulted(PANICKED.to_owned()))?;
-            (thoughts, self.estimate, planning) = (Some(found), Some(estimate), None);
+            let (result, estimate) = plans.ok_or_else(|| Outcome::Faulted(PANICKED.to_owned()))?;
+            (thoughts, self.estimate, planning) = (Some(result), Some(estimate), None);
         }
         let finish = move |robot: &mut Robot, _: &Missions| robot.finish(search, thoughts);
         Ok((self.with_robot(finish).await?, planning))
@@ -272,7 +272,7 @@ impl<S: Store> Runner<S> {
         let plans = async move {
             let timing = Arc::clone(&shared);
             let think = move || timing.timed(|| thinker.think());
-            shared.threads.search(&mission, estimate, think).await.ok()
+            shared.threads.search(&mission, estimate, think).await
         };
         Planning { search, plans: plans.boxed() }
     }
@@ -305,7 +305,9 @@ impl<S: Store> Runner<S> {
 
     /// Returns the robot, which is loaded from its last decision if necessary.
     async fn load(&mut self) -> &mut Loaded {
-        if self.loaded.is_none() {
+        let loaded = if let Some(loaded) = self.loaded.take() {
+            loaded
+        } else {
             // Plans for the problems of the former loop cannot be distinguished from those for the problems of this one.
             self.search.update(None);
             let last = persist(|| self.shared.store.last(Stream::Decisions, &self.subject)).await;
@@ -313,10 +315,9 @@ impl<S: Store> Runner<S> {
             let robot = last.map_or_else(Robot::default, |last| {
                 Decided::parse(&last.payload).map_or_else(Robot::unreadable, Robot::restore)
             });
-            let count = Count::new(&self.shared.counts.robots);
-            return self.loaded.insert(Loaded { robot: Box::new(robot), chain, _count: count });
-        }
-        self.loaded.as_mut().expect("it is loaded")
+            Loaded { robot: Box::new(robot), chain, _count: Count::new(&self.shared.counts.robots) }
+        };
+        self.loaded.insert(loaded)
     }
 
     /// Runs work without a search on the robot, on a thread for such work.
@@ -331,7 +332,7 @@ impl<S: Store> Runner<S> {
             let result = shared.timed(|| work(&mut loaded.robot, &shared.missions));
             Some((loaded, result))
         };
-        let done = self.shared.threads.quick(work).await.ok().flatten();
+        let done = self.shared.threads.quick(work).await.flatten();
         let (loaded, result) = done.ok_or_else(|| Outcome::Faulted(PANICKED.to_owned()))?;
         self.loaded = Some(loaded);
         Ok(result)
