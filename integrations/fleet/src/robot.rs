@@ -93,17 +93,22 @@ enum Request<'a> {
     Observe,
 }
 
-/// Reason why a robot cannot handle events until its mission or data are repaired.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Faulted(pub String);
+/// Reason why an event is not decided.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Undecided {
+    /// The event is refused, and has changed nothing.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// The robot cannot handle events until its mission or data are repaired.
+    #[error("{0}")]
+    Faulted(String),
+}
 
 /// Result of the first phase of a decision.
 #[derive(Debug)]
 pub enum Begun {
     /// The event is decided.
     Decided(Decided),
-    /// The event is refused and has changed nothing.
-    Refused(Refused),
     /// A search for a plan is necessary: [`Robot::search`] or [`Robot::finish`] completes the decision.
     Search(Search),
 }
@@ -136,21 +141,16 @@ impl Robot {
     }
 
     /// Decides an event: enrols the robot, retires it, changes the version of its mission, or lets its
-    /// loop handle the event. Returns a [`Refused`] if the event is refused; the state is then
-    /// unchanged.
+    /// loop handle the event.
     ///
     /// # Errors
-    /// The robot cannot continue: its mission is missing, or its snapshot does not fit the mission.
-    pub fn decide(
-        &mut self,
-        event: &Stored,
-        missions: &Missions,
-    ) -> Result<Result<Decided, Refused>, Faulted> {
-        Ok(match self.begin(event, missions)? {
+    /// The event is refused, and the state is unchanged. Or the robot cannot continue: its mission is missing, or its
+    /// snapshot does not fit the mission.
+    pub fn decide(&mut self, event: &Stored, missions: &Missions) -> Result<Decided, Undecided> {
+        match self.begin(event, missions)? {
             Begun::Decided(decided) => Ok(decided),
-            Begun::Refused(refused) => Err(refused),
-            Begun::Search(search) => Ok(self.search(search)?),
-        })
+            Begun::Search(search) => self.search(search),
+        }
     }
 
     /// Runs the first phase of [`Robot::decide`], which includes everything except searches for
@@ -158,10 +158,10 @@ impl Robot {
     ///
     /// # Errors
     /// As for [`Robot::decide`].
-    pub fn begin(&mut self, event: &Stored, missions: &Missions) -> Result<Begun, Faulted> {
+    pub fn begin(&mut self, event: &Stored, missions: &Missions) -> Result<Begun, Undecided> {
         match event.id.as_ref().map(|id| self.state.ids.membership(id)) {
-            Some(Membership::Present) => return Ok(Begun::Refused(Refused::Repeated)),
-            Some(Membership::Unclear) => return Ok(Begun::Refused(Refused::Late)),
+            Some(Membership::Present) => return Err(Refused::Repeated.into()),
+            Some(Membership::Unclear) => return Err(Refused::Late.into()),
             Some(Membership::Absent) | None => {}
         }
         let text = String::from_utf8_lossy(&event.payload);
@@ -169,22 +169,19 @@ impl Robot {
         let request = request(&head);
         let decided = Decided { event: event.sequence, ..Decided::default() };
         let mut search = Search { decided, answers: Vec::new(), id: event.id.clone() };
-        let name = match (request, self.state.mission.clone()) {
-            (Request::Enrol(name), None) => {
-                let Some(template) = missions.get(name) else {
-                    return Ok(Begun::Refused(Refused::Mission));
-                };
-                search.decided.enrolled = Some(name.to_owned());
-                self.state.mission = Some(name.to_owned());
-                (self.state.digest, self.state.enrolled) = (template.digest.clone(), event.time);
-                self.control =
-                    Control::Loaded(Box::new(template.control.clone()), Arc::clone(&template.baseline));
-                return Ok(self.deliberate(search));
+        if let Request::Enrol(name) = request {
+            if self.state.mission.is_some() {
+                return Err(Refused::Enrolled.into());
             }
-            (Request::Enrol(_), Some(_)) => return Ok(Begun::Refused(Refused::Enrolled)),
-            (_, None) => return Ok(Begun::Refused(Refused::Unknown)),
-            (_, Some(name)) => name,
-        };
+            let template = missions.get(name).ok_or(Refused::Mission)?;
+            search.decided.enrolled = Some(name.to_owned());
+            self.state.mission = Some(name.to_owned());
+            (self.state.digest, self.state.enrolled) = (template.digest.clone(), event.time);
+            self.control =
+                Control::Loaded(Box::new(template.control.clone()), Arc::clone(&template.baseline));
+            return Ok(self.deliberate(search));
+        }
+        let name = self.state.mission.clone().ok_or(Refused::Unknown)?;
         search.decided.now = event.time.saturating_sub(self.state.enrolled);
         match request {
             Request::Retire => {
@@ -194,8 +191,8 @@ impl Robot {
                 return Ok(Begun::Decided(self.complete(search)));
             }
             Request::Migrate(safe_point) => {
-                let Some(at) = safe_point else { return Ok(Begun::Refused(Refused::SafePoint)) };
-                let Some(current) = missions.get(&name) else { return Ok(Begun::Refused(Refused::Mission)) };
+                let at = safe_point.ok_or(Refused::SafePoint)?;
+                let current = missions.get(&name).ok_or(Refused::Mission)?;
                 self.load(missions)?;
                 let target = Some(current.digest.clone()).filter(|target| *target != self.state.digest);
                 self.state.migration = target.map(|target| Migration { at, target });
@@ -217,9 +214,9 @@ impl Robot {
     ///
     /// # Errors
     /// The loop is not loaded, because [`Robot::begin`] did not precede.
-    pub fn search(&mut self, mut search: Search) -> Result<Decided, Faulted> {
+    pub fn search(&mut self, mut search: Search) -> Result<Decided, Undecided> {
         let Control::Loaded(control, _) = &mut self.control else {
-            return Err(Faulted("the loop of the robot is not loaded".to_owned()));
+            return Err(Undecided::Faulted("the loop of the robot is not loaded".to_owned()));
         };
         search.answers.extend(control.deliberate());
         Ok(self.complete(search))
@@ -262,7 +259,7 @@ impl Robot {
     ///
     /// # Errors
     /// As for [`Robot::decide`].
-    pub fn thinker(&mut self, missions: &Missions) -> Result<Option<Thinker>, Faulted> {
+    pub fn thinker(&mut self, missions: &Missions) -> Result<Option<Thinker>, Undecided> {
         if !self.is_pending() {
             return Ok(None);
         }
@@ -287,7 +284,7 @@ impl Robot {
     /// Changes to another version of the mission if this was requested, the version is available, and the loop is at
     /// the requested point. Returns `true` if the robot has changed; the new loop then has to plan. If the version does
     /// not fit, an error becomes an answer, and the request is dropped.
-    fn migrate(&mut self, name: &str, missions: &Missions, search: &mut Search) -> Result<bool, Faulted> {
+    fn migrate(&mut self, name: &str, missions: &Missions, search: &mut Search) -> Result<bool, Undecided> {
         let (Some(migration), Control::Loaded(control, _)) = (&self.state.migration, &self.control) else {
             return Ok(false);
         };
@@ -332,25 +329,28 @@ impl Robot {
         decided
     }
 
-    fn load(&mut self, missions: &Missions) -> Result<&mut Loop, Faulted> {
+    fn load(&mut self, missions: &Missions) -> Result<&mut Loop, Undecided> {
         if let Control::Stored = self.control {
             let template = version(missions, self.mission().unwrap_or_default(), &self.state.digest)?;
             let mut control = template.control.clone();
             let snapshot = std::mem::take(&mut self.state.snapshot);
             let restored = control.restore(&template.baseline.snapshot(snapshot));
-            restored.map_err(|message| Faulted(message.text().to_owned()))?;
+            restored.map_err(|message| Undecided::Faulted(message.text().to_owned()))?;
             self.control = Control::Loaded(Box::new(control), Arc::clone(&template.baseline));
         }
         match &mut self.control {
             Control::Loaded(control, _) => Ok(control),
-            _ => Err(Faulted("the robot's last decision cannot be read: retire the robot".to_owned())),
+            _ => {
+                let why = "the robot's last decision cannot be read: retire the robot".to_owned();
+                Err(Undecided::Faulted(why))
+            }
         }
     }
 }
 
-fn version<'a>(missions: &'a Missions, name: &str, digest: &str) -> Result<&'a Template, Faulted> {
+fn version<'a>(missions: &'a Missions, name: &str, digest: &str) -> Result<&'a Template, Undecided> {
     missions.version(name, digest).ok_or_else(|| {
-        Faulted(format!(
+        Undecided::Faulted(format!(
             "the version {digest} of mission `{name}`, with which it was enrolled, is in no directory of missions: \
              start workers with `--former DIR` for the former files, or retire the robot"
         ))

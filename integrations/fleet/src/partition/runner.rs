@@ -11,7 +11,7 @@ use tokio::sync::{OwnedSemaphorePermit, mpsc, watch};
 
 use super::{Order, Shared, pause, persist};
 use crate::missions::Missions;
-use crate::robot::{Begun, Faulted, Refused, Robot, is_retirement};
+use crate::robot::{Begun, Refused, Robot, Undecided, is_retirement};
 use crate::store::{Fault, Message, Store, Stored, Stream};
 use crate::wire::{Address, Decided};
 
@@ -54,10 +54,19 @@ enum Outcome {
     Decided,
     /// Nothing was decided: the event had been decided before, or there was no event.
     Known,
-    Refused(Refused),
-    Faulted(String),
+    Undecided(Undecided),
     /// Another decision is the last one, or the planning problem has changed.
     Outdated,
+}
+
+impl From<Undecided> for Outcome {
+    fn from(undecided: Undecided) -> Self {
+        Self::Undecided(undecided)
+    }
+}
+
+fn panicked() -> Outcome {
+    Outcome::Undecided(Undecided::Faulted(PANICKED.to_owned()))
 }
 
 /// The plans of a search and the new estimate of the duration of a search. `None` if the search has panicked or could
@@ -194,7 +203,7 @@ impl<S: Store> Runner<S> {
     async fn decide(&mut self, event: &Stored) -> Outcome {
         let id = event.id.as_ref();
         if id.is_some_and(|id| id.split_once(':').is_none_or(|(robot, _)| robot != self.address.robot)) {
-            return Outcome::Refused(Refused::Forged);
+            return Undecided::from(Refused::Forged).into();
         }
         for attempt in 1.. {
             if event.sequence <= self.load().await.robot.event {
@@ -230,11 +239,9 @@ impl<S: Store> Runner<S> {
             (begun, thinker)
         };
         let (begun, thinker) = self.with_robot(begin).await?;
-        let search = match begun {
-            Err(Faulted(why)) => return Err(Outcome::Faulted(why)),
-            Ok(Begun::Decided(decided)) => return Ok((decided, None)),
-            Ok(Begun::Refused(refused)) => return Err(Outcome::Refused(refused)),
-            Ok(Begun::Search(search)) => search,
+        let search = match begun? {
+            Begun::Decided(decided) => return Ok((decided, None)),
+            Begun::Search(search) => search,
         };
         let mut planning = thinker.map(|thinker| self.planning(thinker));
         let mut thoughts = None;
@@ -244,7 +251,7 @@ impl<S: Store> Runner<S> {
             && !patience.is_zero()
             && let Ok(plans) = tokio::time::timeout(patience, plans).await
         {
-            let (result, estimate) = plans.ok_or_else(|| Outcome::Faulted(PANICKED.to_owned()))?;
+            let (result, estimate) = plans.ok_or_else(panicked)?;
             (thoughts, self.estimate, planning) = (Some(result), Some(estimate), None);
         }
         let finish = move |robot: &mut Robot, _: &Missions| robot.finish(search, thoughts);
@@ -259,7 +266,7 @@ impl<S: Store> Runner<S> {
                 self.follow(planning);
                 Outcome::Known
             }
-            Ok(Err(Faulted(why))) => Outcome::Faulted(why),
+            Ok(Err(undecided)) => undecided.into(),
             Err(outcome) => outcome,
         }
     }
@@ -333,7 +340,7 @@ impl<S: Store> Runner<S> {
             Some((loaded, result))
         };
         let done = self.shared.threads.quick(work).await.flatten();
-        let (loaded, result) = done.ok_or_else(|| Outcome::Faulted(PANICKED.to_owned()))?;
+        let (loaded, result) = done.ok_or_else(panicked)?;
         self.loaded = Some(loaded);
         Ok(result)
     }
@@ -361,7 +368,7 @@ impl<S: Store> Runner<S> {
                 }
                 Err(Fault::TooLong(length)) => {
                     let why = format!("a decision of {length} bytes is longer than the server accepts");
-                    break Outcome::Faulted(why);
+                    break Undecided::Faulted(why).into();
                 }
                 Err(Fault::Conflict) => {
                     metrics::counter!("metaplan_fleet_fenced_total").increment(1);
@@ -393,7 +400,7 @@ impl<S: Store> Runner<S> {
             self.search.reset();
         }
         // The events of a suspended robot stay in the log, also those before a refused retirement.
-        let is_stuck = self.is_suspended || matches!(outcome, Outcome::Faulted(_));
+        let is_stuck = self.is_suspended || matches!(outcome, Outcome::Undecided(Undecided::Faulted(_)));
         if let Some(last) = sequence.filter(|_| !is_stuck).or(last) {
             self.handled = self.handled.max(last);
             self.obsolete += 1;
@@ -404,10 +411,10 @@ impl<S: Store> Runner<S> {
             Outcome::Decided => {
                 self.shared.counts.decided.fetch_add(u64::from(sequence.is_some()), Ordering::Relaxed);
             }
-            Outcome::Refused(refused) => {
+            Outcome::Undecided(Undecided::Refused(refused)) => {
                 self.shared.refuse(refused.name(), Some((&self.subject, refused.to_string())));
             }
-            Outcome::Faulted(why) => self.suspend(&why),
+            Outcome::Undecided(Undecided::Faulted(why)) => self.suspend(&why),
         }
     }
 
