@@ -193,13 +193,13 @@ impl Nats {
             };
             let stream = context.get_or_create_stream(config).await.map_err(failed)?;
             let existing = &stream.cached_info().config;
-            let layout_of = || {
+            let settings = || {
                 let partitions = existing.description.as_deref()?.strip_prefix(DESCRIPTION)?.parse().ok()?;
                 let prefix = existing.subjects.first()?.strip_suffix(&format!("{}.*.*", kind.prefix()))?;
                 Some((partitions, prefix.to_owned()))
             };
-            let Some(layout) = layout_of() else { return Ok(Err(name)) };
-            (partitions, prefix) = layout;
+            let Some(settings) = settings() else { return Ok(Err(name)) };
+            (partitions, prefix) = settings;
             streams.push(stream);
         }
         let bucket = format!("{}-workers", layout.fleet);

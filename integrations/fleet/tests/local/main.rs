@@ -1,28 +1,27 @@
-//! Tests of fleets in a directory, without a server. The decisions must equal those of `metaplan
-//! run`, whatever the interruptions. Only one process can use a directory, and all faults of missions
-//! are reported.
+//! Tests of fleets in a directory, without a server. The decisions must equal those of `metaplan run`, whatever the
+//! interruptions. Workers share the partitions, and no robot delays another one. Only one process can use a directory,
+//! and all faults of missions are reported.
 
 mod crashes;
 mod harness;
 mod hostile;
 mod http;
-mod isolation;
 mod planning;
 mod program;
-mod repeated;
 mod scripts;
-mod shares;
 mod versions;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::Settings;
+use metaplan_fleet::robots::status;
 use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::{Message, Store as _, Stream};
+use serde_json::json;
 
-use harness::{Client, Fleet, patient};
+use harness::{Client, ENROL, Fleet, Worker, patient, shared, until};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn robots_are_answered_as_by_a_loop_of_their_own() {
@@ -47,6 +46,78 @@ async fn robots_are_answered_as_by_a_loop_of_their_own() {
     assert_eq!(fleet.all(Stream::Decisions).await.len(), count);
     assert_eq!(fleet.all(Stream::Events).await, [], "decided events are discarded");
     assert_eq!(workers.into_iter().collect::<Vec<_>>(), ["one", "two"]);
+}
+
+fn flaps(name: &str, count: usize) -> Client {
+    let flap = |number: usize| {
+        let status = if number.is_multiple_of(2) { "FALSE" } else { "OK" };
+        // Times are those of the robot, so that filters do not depend on the speed of this machine.
+        let time = 10 * (number + 1);
+        json!({"event": "component_status", "component": "c_kinect", "status": status, "time": time})
+            .to_string()
+    };
+    Client::new(name, "ugv", std::iter::once(ENROL.to_owned()).chain((0..count).map(flap)).collect())
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_robot_with_many_events_does_not_delay_another_one() {
+    let fleet = Fleet::new(1);
+    let (mut sick, mut well) = (flaps("sick", 400), flaps("well", 2));
+    sick.send(&fleet, ..).await;
+    well.send(&fleet, ..).await;
+    let settings = Settings { discard_every: 7, ..patient() };
+    // The partition changes its owner while events of `sick` are not in the queue.
+    fleet.work("one", settings, 150).await;
+    fleet.work("two", settings, sick.events.len() + well.events.len()).await;
+    sick.verify(&fleet).await;
+    well.verify(&fleet).await;
+    let order = fleet.all(Stream::Decisions).await;
+    let last = order.iter().rposition(|decision| decision.subject == "0.well").expect("it is decided");
+    // The order of the threads also depends on the machine.
+    assert!(last + 1 < order.len(), "all events of `sick` come first");
+}
+
+/// On a slow machine, a shorter lease expires while its owner still works.
+const LEASE: Duration = Duration::from_secs(2);
+
+async fn distributed(fleet: &Fleet, expected: &[usize]) {
+    let what = format!("partitions are not distributed as {expected:?}");
+    let is_distributed = async || {
+        let mut counts: BTreeMap<Option<String>, usize> = BTreeMap::new();
+        for partition in status(&fleet.store).await.expect("it can be read").partitions {
+            *counts.entry(partition.worker).or_default() += 1;
+        }
+        let mut counts: Vec<usize> = counts.into_values().collect();
+        counts.sort_unstable();
+        counts == expected
+    };
+    until(&what, is_distributed).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn partitions_are_shared_and_taken_over() {
+    let fleet = Fleet::with(8, 100, LEASE);
+    let begin = |name: &str| Worker::start(shared(fleet.store.clone(), name, patient()));
+    let mut robot = Client::play("r", ("ugv", "kinect_comes_and_goes"), 5, 30);
+    robot.send(&fleet, ..10).await;
+    let first = begin("first");
+    distributed(&fleet, &[8]).await;
+    let second = begin("second");
+    distributed(&fleet, &[4, 4]).await;
+    robot.send(&fleet, ..20).await;
+    // A worker is aborted, so its status expires.
+    second.abort();
+    robot.send(&fleet, ..).await;
+    distributed(&fleet, &[8]).await;
+    fleet.decided(robot.events.len()).await;
+    let third = begin("third");
+    distributed(&fleet, &[4, 4]).await;
+    first.stop().await;
+    distributed(&fleet, &[8]).await;
+    third.stop().await;
+    robot.verify(&fleet).await;
+    let partitions = status(&fleet.store).await.expect("it can be read").partitions;
+    assert!(partitions.iter().all(|partition| partition.worker.is_none()), "{partitions:?}");
 }
 
 #[test]
