@@ -117,7 +117,7 @@ async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
         Client::play("ugv-a", ("ugv", "kinect_at_wp2"), 3, 7),
         Client::play("uuv-b", ("uuv", "suave"), 3, 7),
     ];
-    let count = robots.iter().map(|robot| robot.events.len()).sum();
+    let count: usize = robots.iter().map(|robot| robot.events.len()).sum();
     let settings = Settings { discard_every: 2, ..patient() };
     let mut crashes = 0;
     for carries_out in [false, true] {

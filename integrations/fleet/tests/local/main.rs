@@ -32,7 +32,7 @@ async fn robots_are_answered_as_by_a_loop_of_their_own() {
         robot.send(&fleet, ..).await;
         robots.push(robot);
     }
-    let count = robots.iter().map(|robot| robot.events.len()).sum();
+    let count: usize = robots.iter().map(|robot| robot.events.len()).sum();
     // The limit of loaded robots is below the number of robots, so that all robots are unloaded and
     // restored.
     let settings = Settings { warm: 2, discard_every: 5, ..patient() };
