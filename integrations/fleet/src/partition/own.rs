@@ -4,14 +4,14 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError};
 
-use futures::stream::{BoxStream, StreamExt as _};
+use futures::StreamExt as _;
 use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::task::JoinSet;
 
 use super::runner::{Count, Queued, Runner};
 use super::{Order, Shared, pause};
 use crate::robot::Refused;
-use crate::store::{Fault, Store, Stored, Stream};
+use crate::store::{Fault, Store, Stored, Stream, Subscription};
 use crate::wire::{Address, partition_of};
 
 /// Maximum number of undecided events that each robot has in memory. Only the sequence numbers of further ones are.
@@ -51,7 +51,7 @@ impl<S: Store> Partition<S> {
 
     pub(super) async fn run(mut self) {
         let (mut backoff, mut reached) = (0, 0);
-        let mut events: Option<BoxStream<'static, Result<Stored, Fault>>> = None;
+        let mut events: Option<Subscription> = None;
         let mut look = tokio::time::interval(self.shared.settings.look);
         look.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let mut orders = self.orders.clone();
@@ -185,9 +185,7 @@ impl<S: Store> Partition<S> {
     }
 }
 
-async fn next(
-    events: &mut Option<BoxStream<'static, Result<Stored, Fault>>>,
-) -> Option<Result<Stored, Fault>> {
+async fn next(events: &mut Option<Subscription>) -> Option<Result<Stored, Fault>> {
     match events {
         Some(events) => events.next().await,
         None => std::future::pending().await,

@@ -8,12 +8,12 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use futures::stream::{self, BoxStream, StreamExt as _};
+use futures::stream::{self, StreamExt as _};
 use metaplan::message::Message as Diagnostic;
 use redb::{Database, ReadableDatabase as _, ReadableTable as _, Table, TableDefinition};
 use tokio::sync::{broadcast, mpsc, oneshot, watch};
 
-use super::{Fault, Message, Receipt, Store, Stored, Stream};
+use super::{Fault, Message, Receipt, Store, Stored, Stream, Subscription};
 use crate::wire::{Address, Presence};
 
 const FILE: &str = "fleet.redb";
@@ -292,12 +292,7 @@ impl Store for Local {
         self.0.lease
     }
 
-    async fn follow(
-        &self,
-        stream: Stream,
-        partition: u32,
-        after: u64,
-    ) -> Result<BoxStream<'static, Result<Stored, Fault>>, Fault> {
+    async fn follow(&self, stream: Stream, partition: u32, after: u64) -> Result<Subscription, Fault> {
         let state = (self.clone(), self.0.written.clone(), after);
         let next = move |(store, mut written, after): (Self, watch::Receiver<u64>, u64)| async move {
             loop {

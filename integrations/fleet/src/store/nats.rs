@@ -23,7 +23,7 @@ use futures::stream::BoxStream;
 use futures::{StreamExt as _, TryStreamExt as _};
 use metaplan::message::Message as Diagnostic;
 
-use super::{Fault, Message, Receipt, Store, Stored, Stream};
+use super::{Fault, Message, Receipt, Store, Stored, Stream, Subscription};
 use crate::wire::{Presence, is_name};
 
 /// Settings for the connection to NATS servers, which are also options of the program.
@@ -299,12 +299,7 @@ impl Store for Nats {
         self.lease
     }
 
-    async fn follow(
-        &self,
-        kind: Stream,
-        partition: u32,
-        after: u64,
-    ) -> Result<BoxStream<'static, Result<Stored, Fault>>, Fault> {
+    async fn follow(&self, kind: Stream, partition: u32, after: u64) -> Result<Subscription, Fault> {
         let config = pull::OrderedConfig {
             filter_subject: self.subject(kind, &format!("{partition}.*")),
             deliver_policy: DeliverPolicy::ByStartSequence { start_sequence: after + 1 },

@@ -6,10 +6,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use futures::stream::BoxStream;
 use metaplan_fleet::partition::Settings;
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Fault, Message, Receipt, Store, Stored, Stream};
+use metaplan_fleet::store::{Fault, Message, Receipt, Store, Stored, Stream, Subscription};
 use metaplan_fleet::wire::Presence;
 use tokio::sync::Notify;
 
@@ -63,12 +62,7 @@ impl Store for Crashing {
         self.inner.lease()
     }
 
-    async fn follow(
-        &self,
-        stream: Stream,
-        partition: u32,
-        after: u64,
-    ) -> Result<BoxStream<'static, Result<Stored, Fault>>, Fault> {
+    async fn follow(&self, stream: Stream, partition: u32, after: u64) -> Result<Subscription, Fault> {
         self.through(self.inner.follow(stream, partition, after)).await
     }
 
