@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use test_resources::{Resource, missing};
 
-use super::http::{free_port, get};
+use super::common::{free_port, get};
 use super::wires::Wire;
 
 const PAIRS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];

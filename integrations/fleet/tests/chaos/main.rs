@@ -10,8 +10,8 @@
 #![expect(clippy::print_stdout, reason = "what was done to whom is said while it is done")]
 
 mod cluster;
-#[path = "../local/http.rs"]
-mod http;
+#[path = "../local/common.rs"]
+mod common;
 #[path = "../local/scripts.rs"]
 mod scripts;
 mod wires;
@@ -21,10 +21,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use futures::StreamExt as _;
 use metaplan_fleet::robots::{Sender, status};
 use metaplan_fleet::store::nats::{Access, Layout, Nats};
-use metaplan_fleet::store::{Fault, Message, Store, Stored, Stream};
+use metaplan_fleet::store::{Message, Store as _, Stored, Stream};
 use metaplan_fleet::wire::{Address, Decided, partition_of};
 use serde_json::json;
 
@@ -104,23 +103,12 @@ async fn send(store: &Nats, robots: usize, scripts: &[Script], pause: u64) -> BT
 /// Returns all decisions of a partition.
 async fn read(store: &Nats, partition: u32) -> Vec<Stored> {
     for _ in 0..60 {
-        if let Ok(messages) = try_read(store, partition).await {
+        if let Ok(messages) = common::read(store, Stream::Decisions, partition).await {
             return messages;
         }
         tokio::time::sleep(Duration::from_millis(500)).await;
     }
     panic!("partition {partition} cannot be read");
-}
-
-async fn try_read(store: &Nats, partition: u32) -> Result<Vec<Stored>, Fault> {
-    let end = store.end(Stream::Decisions, partition).await?;
-    let mut messages: Vec<Stored> = Vec::new();
-    let mut reader = store.follow(Stream::Decisions, partition, 0).await?;
-    while messages.last().map_or(0, |last| last.sequence) < end {
-        let next = tokio::time::timeout(Duration::from_secs(10), reader.next()).await;
-        messages.push(next.ok().flatten().unwrap_or(Err(Fault::Conflict))?);
-    }
-    Ok(messages)
 }
 
 /// Returns `true` for a decision that completes others with a plan.

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
-use futures::StreamExt as _;
 use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::{Order, Settings, Shared, serve};
 use metaplan_fleet::robots::Sender;
@@ -17,6 +16,7 @@ use tempfile::TempDir;
 use tokio::sync::{broadcast, watch};
 use tokio::task::JoinHandle;
 
+use super::common::read;
 use super::scripts;
 
 pub(super) const ENROL: &str = r#"{"event": "enrol", "mission": "ugv"}"#;
@@ -112,14 +112,7 @@ impl Fleet {
     pub(super) async fn all(&self, stream: Stream) -> Vec<Stored> {
         let mut messages = Vec::new();
         for partition in 0..self.store.partitions() {
-            let end = self.store.end(stream, partition).await.expect("it can be read");
-            let mut reader = self.store.follow(stream, partition, 0).await.expect("it can be read");
-            let mut last = 0;
-            while last < end {
-                let message = reader.next().await.expect("it does not end").expect("it can be read");
-                last = message.sequence;
-                messages.push(message);
-            }
+            messages.extend(read(&self.store, stream, partition).await.expect("it can be read"));
         }
         messages
     }

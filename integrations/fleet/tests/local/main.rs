@@ -2,10 +2,10 @@
 //! interruptions. Workers share the partitions, and no robot delays another one. Only one process can use a directory,
 //! and all faults of missions are reported.
 
+mod common;
 mod crashes;
 mod harness;
 mod hostile;
-mod http;
 mod planning;
 mod program;
 mod scripts;

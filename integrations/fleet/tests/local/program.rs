@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use super::http::{free_port, get};
+use super::common::{free_port, get};
 
 struct Program {
     child: Child,
