@@ -122,8 +122,13 @@ impl<S: Store> Partition<S> {
         // The slot or the running robot has the receiver.
         let _ = slot.queue.send(Queued { sequence, event: permit.map(|permit| (event, permit)), waiting });
         if let Some(runner) = slot.idle.take() {
-            self.running.spawn(runner.run(self.orders.clone()));
+            self.start(runner);
         }
+    }
+
+    fn start(&mut self, runner: Box<Runner<S>>) {
+        let run = runner.run(self.orders.clone());
+        self.running.spawn(async { Some(run.await) });
     }
 
     fn discard_refused(&mut self, Stored { sequence, subject, .. }: Stored) {
@@ -142,7 +147,7 @@ impl<S: Store> Partition<S> {
         let Some(slot) = self.slots.get_mut(name) else { return };
         self.recent.remove(&slot.used);
         if runner.has_events() {
-            self.running.spawn(runner.run(self.orders.clone()));
+            self.start(runner);
         } else if runner.is_obsolete() {
             self.slots.remove(name);
         } else {
@@ -174,13 +179,11 @@ impl<S: Store> Partition<S> {
     /// [`Settings::discard_within`](super::Settings::discard_within) ago, or, with `all`, all others, too.
     fn discard(&mut self, all: bool) {
         let within = self.shared.settings.discard_within;
-        for slot in self.slots.values_mut() {
-            let runner = slot
-                .idle
-                .take_if(|runner| runner.since.is_some_and(|since| all || since.elapsed() >= within));
-            if let Some(runner) = runner {
-                self.running.spawn(runner.run(self.orders.clone()));
-            }
+        let is_due =
+            |runner: &mut Box<Runner<S>>| runner.since.is_some_and(|since| all || since.elapsed() >= within);
+        let due: Vec<_> = self.slots.values_mut().filter_map(|slot| slot.idle.take_if(is_due)).collect();
+        for runner in due {
+            self.start(runner);
         }
     }
 }

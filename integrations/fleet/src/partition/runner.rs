@@ -150,7 +150,7 @@ impl<S: Store> Runner<S> {
 
     /// Works until there are no events and no plan is pending, or the partition is given back. Then discards handled
     /// events if they are due.
-    pub(super) async fn run(mut self: Box<Self>, mut orders: watch::Receiver<Order>) -> Option<Box<Self>> {
+    pub(super) async fn run(mut self: Box<Self>, mut orders: watch::Receiver<Order>) -> Box<Self> {
         while self.has_events() || self.is_pending || self.plans.is_some() {
             if self.is_pending && self.plans.is_none() && !self.has_events() {
                 let outcome = self.start_planning().await;
@@ -179,7 +179,7 @@ impl<S: Store> Runner<S> {
         if self.obsolete > 0 && (is_draining || is_late || self.is_unknown()) {
             self.discard().await;
         }
-        Some(self)
+        self
     }
 
     async fn handle(&mut self, Queued { sequence, event, waiting }: Queued) {

@@ -118,7 +118,7 @@ async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
         for operations in 1.. {
             let (fleet, mut robots) = (Fleet::new(1), robots.clone());
             for robot in &mut robots {
-                robot.send(&fleet, ..).await;
+                robot.send_all(&fleet).await;
             }
             let crashing = Crashing { carries_out, ..Crashing::new(&fleet, operations) };
             let over = Arc::clone(&crashing.over);
@@ -152,12 +152,12 @@ async fn two_owners_decide_each_event_once_but_twice_without_the_comparison() {
         };
         let _zombie = own("zombie");
         if fences {
-            robot.send(&fleet, ..10).await;
+            robot.send(&fleet, 10).await;
             fleet.decided(3 + seed as usize).await;
         }
         let _owner = own("owner");
         for number in robot.sequences.len()..robot.events.len() {
-            robot.send(&fleet, ..=number).await;
+            robot.send(&fleet, number + 1).await;
             tokio::time::sleep(Duration::from_millis(fastrand::u64(0..20))).await;
         }
         let mut count = robot.events.len();
@@ -181,7 +181,7 @@ async fn owners_that_are_gone_at_any_time_leave_what_is_needed() {
     let mut robots = Vec::new();
     for seed in 0..6 {
         let mut robot = Client::play(&format!("r{seed}"), ("ugv", "kinect_comes_and_goes"), seed, 30);
-        robot.send(&fleet, ..).await;
+        robot.send_all(&fleet).await;
         robots.push(robot);
     }
     let mut random = fastrand::Rng::with_seed(7);
@@ -199,7 +199,7 @@ async fn owners_that_are_gone_at_any_time_leave_what_is_needed() {
 async fn events_are_discarded_after_failed_attempts() {
     let fleet = Fleet::new(1);
     let mut robot = Client::play("r", ("ugv", "kinect_at_wp2"), 3, 7);
-    robot.send(&fleet, ..).await;
+    robot.send_all(&fleet).await;
     let crashing = Crashing { failing: Arc::new(5.into()), ..Crashing::new(&fleet, u64::MAX) };
     let settings = Settings { discard_within: Duration::from_millis(10), ..patient() };
     let _owner = Owner::start(shared(crashing, "first", settings));
@@ -213,7 +213,7 @@ async fn a_drain_does_not_wait_for_jobs_without_end() {
     let settings = Settings { drain: Duration::from_millis(100), ..patient() };
     for operations in 3..9 {
         let (fleet, mut robot) = (Fleet::new(1), robot.clone());
-        robot.send(&fleet, ..).await;
+        robot.send_all(&fleet).await;
         let crashing = Crashing { carries_out: true, ..Crashing::new(&fleet, operations) };
         let over = Arc::clone(&crashing.over);
         let owner = Owner::start(shared(crashing, "first", settings));

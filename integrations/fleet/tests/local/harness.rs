@@ -1,6 +1,5 @@
 //! Fleets in a directory, with their robots and workers.
 
-use std::ops::RangeBounds;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
@@ -178,12 +177,14 @@ impl Client {
         Self::new(name, scenario.0, scripts::play(scenario, seed, most))
     }
 
-    /// Sends the next events, up to the end of `range`.
-    pub(super) async fn send(&mut self, fleet: &Fleet, range: impl RangeBounds<usize>) {
-        while self.sequences.len() < self.events.len() && range.contains(&self.sequences.len()) {
-            let event = &self.events[self.sequences.len()];
-            self.sequences.extend(fleet.tell(&self.name, &[event]).await);
-        }
+    /// Sends the next events, up to `count` in total.
+    pub(super) async fn send(&mut self, fleet: &Fleet, count: usize) {
+        let next = &self.events[self.sequences.len()..count];
+        self.sequences.extend(fleet.tell(&self.name, next).await);
+    }
+
+    pub(super) async fn send_all(&mut self, fleet: &Fleet) {
+        self.send(fleet, self.events.len()).await;
     }
 
     /// Checks that each event that was sent has one decision, which contains its plan, with the answers of a single

@@ -29,7 +29,7 @@ async fn robots_are_answered_as_by_a_loop_of_their_own() {
     let mut robots = Vec::new();
     for (number, scenario) in scripts::SCENARIOS.into_iter().cycle().take(8).enumerate() {
         let mut robot = Client::play(&format!("r-{number}"), scenario, number as u64, 40);
-        robot.send(&fleet, ..).await;
+        robot.send_all(&fleet).await;
         robots.push(robot);
     }
     let count: usize = robots.iter().map(|robot| robot.events.len()).sum();
@@ -63,8 +63,8 @@ fn flaps(name: &str, count: usize) -> Client {
 async fn a_robot_with_many_events_does_not_delay_another_one() {
     let fleet = Fleet::new(1);
     let (mut sick, mut well) = (flaps("sick", 400), flaps("well", 2));
-    sick.send(&fleet, ..).await;
-    well.send(&fleet, ..).await;
+    sick.send_all(&fleet).await;
+    well.send_all(&fleet).await;
     let settings = Settings { discard_every: 7, ..patient() };
     // The partition changes its owner while events of `sick` are not in the queue.
     fleet.work("one", settings, 150).await;
@@ -99,15 +99,15 @@ async fn partitions_are_shared_and_taken_over() {
     let fleet = Fleet::with(8, 100, LEASE);
     let begin = |name: &str| Worker::start(shared(fleet.store.clone(), name, patient()));
     let mut robot = Client::play("r", ("ugv", "kinect_comes_and_goes"), 5, 30);
-    robot.send(&fleet, ..10).await;
+    robot.send(&fleet, 10).await;
     let first = begin("first");
     distributed(&fleet, &[8]).await;
     let second = begin("second");
     distributed(&fleet, &[4, 4]).await;
-    robot.send(&fleet, ..20).await;
+    robot.send(&fleet, 20).await;
     // A worker is aborted, so its status expires.
     second.abort();
-    robot.send(&fleet, ..).await;
+    robot.send_all(&fleet).await;
     distributed(&fleet, &[8]).await;
     fleet.decided(robot.events.len()).await;
     let third = begin("third");

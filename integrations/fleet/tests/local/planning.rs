@@ -21,10 +21,10 @@ async fn a_single_owner_handles_all_events_of_a_long_queue() {
     let _owner = fleet.own("owner", Settings { discard_every: 1, ..hasty(0) });
     // Events that wait for the plans of earlier ones, and then events that do not.
     for number in 0..60 {
-        robot.send(&fleet, ..=number).await;
+        robot.send(&fleet, number + 1).await;
         fleet.settle().await;
     }
-    robot.send(&fleet, ..).await;
+    robot.send_all(&fleet).await;
     // This event is refused while a plan is missing, and must be discarded, too.
     fleet.tell("s", &robot.events[..1]).await;
     fleet.append_event("0.s", "r:1", RETIRE.as_bytes()).await;
@@ -45,7 +45,7 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
     let mut robots = Vec::new();
     for (number, scenario) in scripts::SCENARIOS.into_iter().enumerate() {
         let mut robot = Client::play(&format!("r-{number}"), scenario, number as u64, 40);
-        robot.send(&fleet, ..).await;
+        robot.send_all(&fleet).await;
         robots.push(robot);
     }
     let mut random = fastrand::Rng::with_seed(5);

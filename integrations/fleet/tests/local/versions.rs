@@ -80,9 +80,9 @@ async fn robots_finish_on_the_version_with_which_they_were_enrolled() {
     let versions = Versions::new();
     let fleet = &versions.fleet;
     let mut robot = Client::play("r", ("ugv", "kinect_comes_and_goes"), 3, 30);
-    robot.send(fleet, ..10).await;
+    robot.send(fleet, 10).await;
     versions.work(&["old"], 10).await;
-    robot.send(fleet, ..).await;
+    robot.send_all(fleet).await;
     fleet.tell("s", &[ENROL]).await;
     versions.work(&["new", "old"], robot.events.len() + 1).await;
     robot.verify(fleet).await;
@@ -96,15 +96,15 @@ async fn a_robot_without_its_version_waits_for_it_and_delays_nobody() {
     let fleet = &versions.fleet;
     let [mut robot, mut other] = [("r", 3), ("s", 4)]
         .map(|(name, seed)| Client::play(name, ("ugv", "kinect_comes_and_goes"), seed, 30));
-    robot.send(fleet, ..10).await;
+    robot.send(fleet, 10).await;
     versions.work(&["old"], 10).await;
-    robot.send(fleet, ..20).await;
-    other.send(fleet, ..).await;
+    robot.send(fleet, 20).await;
+    other.send_all(fleet).await;
     versions.work(&["new"], 10 + other.events.len()).await;
     assert_eq!(versions.kept().await, robot.sequences[10..], "only events of `r` are kept");
     assert_eq!(fleet.of("r").await.len(), 10);
     // The former files are back.
-    robot.send(fleet, ..).await;
+    robot.send_all(fleet).await;
     for names in [&["old", "new"][..], &["new", "old"]] {
         versions.work(names, robot.events.len() + other.events.len()).await;
     }
