@@ -14,7 +14,7 @@ use metaplan_fleet::partition::Shared;
 use metaplan_fleet::robots::{Sender, Status};
 use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::{Store, Stored, Stream};
-use metaplan_fleet::wire::{Address, Decided, Presence, is_name};
+use metaplan_fleet::wire::{Address, Decided, Presence, is_name, partition_of};
 use metaplan_fleet::worker;
 use serde_json::{Map, Value};
 use tokio::io::{AsyncBufReadExt as _, BufReader, stdin};
@@ -130,85 +130,72 @@ fn line(message: &Stored) -> Option<(String, String)> {
     Some((address.robot, Value::Object(line).to_string()))
 }
 
-/// Writes the decisions of one robot to standard output, or those of all robots if `robot` is
-/// `None`. Ends when the output is closed or the log fails. Begins after the decision `after`, or
-/// with the next new decision if `after` is `None`.
-pub(crate) async fn follow<S: Store>(
+/// Writes decisions to standard output until it is closed or the log fails.
+pub(crate) struct Writer<S> {
     store: S,
-    robot: Option<&str>,
-    after: Option<u64>,
-) -> Result<(), Message> {
-    let partitions: Vec<u32> = match robot {
-        Some(robot) => vec![Address::of(robot, store.partitions()).partition],
-        None => (0..store.partitions()).collect(),
-    };
-    let reached = Mutex::new(beginning(&store, partitions, after).await?);
-    write_decisions(&store, robot, &reached).await
+    /// `None` for the decisions of all robots.
+    robot: Option<String>,
+    /// Sequence numbers up to which decisions are written, by partition.
+    written: Mutex<BTreeMap<u32, u64>>,
 }
 
-/// Returns for each partition the sequence number after which decisions are written: `after`, or
-/// the current end of the partition.
-async fn beginning<S: Store>(
-    store: &S,
-    partitions: Vec<u32>,
-    after: Option<u64>,
-) -> Result<BTreeMap<u32, u64>, Message> {
-    let mut reached = BTreeMap::new();
-    for partition in partitions {
-        let start = match after {
-            Some(after) => after,
-            None => store.end(Stream::Decisions, partition).await.map_err(fault)?,
+impl<S: Store> Writer<S> {
+    /// Returns a writer that begins after the decision `after`, or with the next new decision if `after` is `None`.
+    pub(crate) async fn new(store: S, robot: Option<String>, after: Option<u64>) -> Result<Self, Message> {
+        let partitions: Vec<u32> = match &robot {
+            Some(robot) => vec![partition_of(robot, store.partitions())],
+            None => (0..store.partitions()).collect(),
         };
-        reached.insert(partition, start);
+        let mut written = BTreeMap::new();
+        for partition in partitions {
+            let start = match after {
+                Some(after) => after,
+                None => store.end(Stream::Decisions, partition).await.map_err(fault)?,
+            };
+            written.insert(partition, start);
+        }
+        Ok(Self { store, robot, written: Mutex::new(written) })
     }
-    Ok(reached)
-}
 
-/// Writes the decisions after the sequence numbers in `reached`, by partition, of one robot or of all robots
-/// if `robot` is `None`. Updates `reached`. Ends when the output is closed or the log fails.
-async fn write_decisions<S: Store>(
-    store: &S,
-    robot: Option<&str>,
-    reached: &Mutex<BTreeMap<u32, u64>>,
-) -> Result<(), Message> {
-    loop {
-        let from = reached.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let mut streams = Vec::new();
-        for (partition, after) in from {
-            let stream = store.follow(Stream::Decisions, partition, after).await.map_err(fault)?;
-            streams.push(stream.map(move |message| (partition, message)).boxed());
-        }
-        let mut decisions = select_all(streams);
-        while let Some((partition, message)) = decisions.next().await {
-            // The subscription was interrupted and is started again.
-            let Ok(message) = message else { break };
-            if let Some((name, text)) = line(&message)
-                && robot.is_none_or(|robot| robot == name)
-            {
-                let mut out = io::stdout().lock();
-                match writeln!(out, "{name} {text}").and_then(|()| out.flush()) {
-                    Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
-                    other => other.map_err(unwritten)?,
-                }
+    pub(crate) async fn run(&self) -> Result<(), Message> {
+        loop {
+            let from = self.written.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let mut streams = Vec::new();
+            for (partition, after) in from {
+                let stream = self.store.follow(Stream::Decisions, partition, after).await.map_err(fault)?;
+                streams.push(stream.map(move |message| (partition, message)).boxed());
             }
-            let mut reached = reached.lock().unwrap_or_else(PoisonError::into_inner);
-            reached.insert(partition, message.sequence);
+            let mut decisions = select_all(streams);
+            while let Some((partition, message)) = decisions.next().await {
+                // The subscription was interrupted and is started again.
+                let Ok(message) = message else { break };
+                if let Some((name, text)) = line(&message)
+                    && self.robot.as_ref().is_none_or(|robot| *robot == name)
+                {
+                    let mut out = io::stdout().lock();
+                    match writeln!(out, "{name} {text}").and_then(|()| out.flush()) {
+                        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
+                        other => other.map_err(unwritten)?,
+                    }
+                }
+                let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+                written.insert(partition, message.sequence);
+            }
+            tokio::time::sleep(Duration::from_millis(fastrand::u64(50..500))).await;
         }
-        tokio::time::sleep(Duration::from_millis(fastrand::u64(50..500))).await;
     }
 }
 
 /// Runs a fleet in a directory: events from standard input, decisions to standard output. Ends when
 /// `stop` becomes true, or when the input has ended and either all events are decided (except those of
-/// suspended robots) or the output is closed. `after` is as in [`follow`].
+/// suspended robots) or the output is closed. `after` is as in [`Writer::new`].
 pub(crate) async fn up(
     shared: Arc<Shared<Local>>,
     after: Option<u64>,
     mut stop: watch::Receiver<bool>,
 ) -> Result<(), Message> {
     let store = shared.store.clone();
-    let partitions = (0..store.partitions()).collect();
-    let written = Arc::new(Mutex::new(beginning(&store, partitions, after).await?));
+    let writer = Arc::new(Writer::new(store.clone(), None, after).await?);
     let mut notices = store.notices();
     tokio::spawn(async move {
         while let Some(message) = warning(notices.recv().await) {
@@ -217,13 +204,13 @@ pub(crate) async fn up(
     });
     let (order, orders) = watch::channel(false);
     let working = tokio::spawn(worker::run(Arc::clone(&shared), orders));
-    let (reader, progress) = (store.clone(), Arc::clone(&written));
-    let writing = tokio::spawn(async move { write_decisions(&reader, None, &progress).await });
+    let running = Arc::clone(&writer);
+    let writing = tokio::spawn(async move { running.run().await });
     let session = format!("{:016x}.", fastrand::u64(..));
     let fed = feed(&store, &session, stop.clone()).await;
     // Waits until all stored events are decided and all decisions written, unless the program is
     // stopped or the output is closed.
-    while !*stop.borrow_and_update() && !writing.is_finished() && !is_done(&shared, &written).await? {
+    while !*stop.borrow_and_update() && !writing.is_finished() && !is_done(&shared, &writer.written).await? {
         tokio::select! {
             _ = stop.changed() => {}
             () = tokio::time::sleep(Duration::from_millis(20)) => {}

@@ -224,10 +224,10 @@ async fn run(command: Command) -> Result<(), Errors> {
             lines::send(server.open(10).await?, &id_prefix(session)).await?;
         }
         Command::Follow { server, robot, after } => {
-            let store = server.open(10).await?;
+            let writer = lines::Writer::new(server.open(10).await?, robot, after).await?;
             let mut stop = signals()?;
             tokio::select! {
-                done = lines::follow(store, robot.as_deref(), after) => done?,
+                done = writer.run() => done?,
                 _ = stop.changed() => {}
             }
         }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use metaplan::mapek::{Answer, Baseline, Loop, Observation, Thinker, Thoughts};
+use serde::Deserialize;
 use serde_json::Value;
 
 use crate::ids::Membership;
@@ -85,11 +86,20 @@ impl Refused {
     }
 }
 
-#[derive(Clone, Copy)]
-enum Request<'a> {
-    Enrol(&'a str),
+/// Events for the fleet; all others are observations for the loop. Fields are checked when the event is decided.
+#[derive(Default, Deserialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+enum Request {
+    Enrol {
+        #[serde(default)]
+        mission: Value,
+    },
     Retire,
-    Migrate(Option<SafePoint>),
+    Migrate {
+        at: Option<Value>,
+    },
+    #[default]
+    #[serde(other)]
     Observe,
 }
 
@@ -165,14 +175,14 @@ impl Robot {
             Some(Membership::Absent) | None => {}
         }
         let text = String::from_utf8_lossy(&event.payload);
-        let head: Value = serde_json::from_str(&text).unwrap_or_default();
-        let request = request(&head);
+        let request: Request = serde_json::from_str(&text).unwrap_or_default();
         let decided = Decided { event: event.sequence, ..Decided::default() };
         let mut search = Search { decided, answers: Vec::new(), id: event.id.clone() };
-        if let Request::Enrol(name) = request {
+        if let Request::Enrol { mission } = &request {
             if self.state.mission.is_some() {
                 return Err(Refused::Enrolled.into());
             }
+            let name = mission.as_str().unwrap_or_default();
             let template = missions.get(name).ok_or(Refused::Mission)?;
             search.decided.enrolled = Some(name.to_owned());
             self.state.mission = Some(name.to_owned());
@@ -190,8 +200,9 @@ impl Robot {
                 search.decided.retired = true;
                 return Ok(Begun::Decided(self.complete(search)));
             }
-            Request::Migrate(safe_point) => {
-                let at = safe_point.ok_or(Refused::SafePoint)?;
+            Request::Migrate { at } => {
+                let at = at.map_or(Ok(SafePoint::default()), serde_json::from_value);
+                let at = at.map_err(|_| Refused::SafePoint)?;
                 let current = missions.get(&name).ok_or(Refused::Mission)?;
                 self.load(missions)?;
                 let target = Some(current.digest.clone()).filter(|target| *target != self.state.digest);
@@ -201,7 +212,7 @@ impl Robot {
                     return Ok(Begun::Decided(self.complete(search)));
                 }
             }
-            Request::Observe | Request::Enrol(_) => {
+            Request::Observe | Request::Enrol { .. } => {
                 let now = Duration::from_micros(search.decided.now);
                 search.answers = self.load(missions)?.react(&Observation::parse(&text), now);
                 self.migrate(&name, missions, &mut search)?;
@@ -360,18 +371,5 @@ fn version<'a>(missions: &'a Missions, name: &str, digest: &str) -> Result<&'a T
 pub(crate) fn is_retirement(payload: &[u8]) -> bool {
     // Most events do not contain this word, so they need not be parsed.
     let has_word = payload.windows(6).any(|part| part == b"retire");
-    has_word && serde_json::from_slice(payload).is_ok_and(|head| matches!(request(&head), Request::Retire))
-}
-
-fn request(head: &Value) -> Request<'_> {
-    let text = |name: &str| head.get(name).and_then(Value::as_str);
-    match text("event") {
-        Some("enrol") => Request::Enrol(text("mission").unwrap_or_default()),
-        Some("retire") => Request::Retire,
-        Some("migrate") => Request::Migrate(match head.get("at") {
-            None => Some(SafePoint::default()),
-            Some(point) => serde_json::from_value(point.clone()).ok(),
-        }),
-        _ => Request::Observe,
-    }
+    has_word && matches!(serde_json::from_slice(payload), Ok(Request::Retire))
 }
