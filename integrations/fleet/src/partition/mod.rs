@@ -146,20 +146,12 @@ impl<S: Store> Shared<S> {
     }
 }
 
-/// Order of the worker to a running partition.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
-    /// Continue to handle events.
-    Go,
-    /// Finish running decisions, discard handled events, and end.
-    Drain,
-}
-
-/// Runs a partition until it is ordered to end, or until the sender of `orders` is dropped.
-pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, orders: watch::Receiver<Order>) {
-    let mut dropped = orders.clone();
+/// Runs a partition until `drain` becomes true or its sender is dropped. If it becomes true, finishes running decisions
+/// and discards handled events.
+pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, drain: watch::Receiver<bool>) {
+    let mut dropped = drain.clone();
     tokio::select! {
-        () = Partition::new(shared, partition, orders).run() => {}
+        () = Partition::new(shared, partition, drain).run() => {}
         () = async { while dropped.changed().await.is_ok() {} } => {}
     }
 }

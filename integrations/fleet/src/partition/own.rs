@@ -9,7 +9,7 @@ use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::task::JoinSet;
 
 use super::runner::{Count, Queued, Runner};
-use super::{Order, Shared, pause};
+use super::{Shared, pause};
 use crate::robot::Refused;
 use crate::store::{Fault, Store, Stored, Stream, Subscription};
 use crate::wire::{Address, partition_of};
@@ -20,7 +20,8 @@ const MAX_QUEUE: usize = 16;
 pub(super) struct Partition<S> {
     shared: Arc<Shared<S>>,
     number: u32,
-    orders: watch::Receiver<Order>,
+    /// `true` if the partition is given back.
+    drain: watch::Receiver<bool>,
     slots: BTreeMap<String, Slot<S>>,
     /// Sequence number of the last event that was read.
     seen: u64,
@@ -44,9 +45,9 @@ struct Slot<S> {
 }
 
 impl<S: Store> Partition<S> {
-    pub(super) fn new(shared: Arc<Shared<S>>, number: u32, orders: watch::Receiver<Order>) -> Self {
+    pub(super) fn new(shared: Arc<Shared<S>>, number: u32, drain: watch::Receiver<bool>) -> Self {
         let (slots, running, recent) = (BTreeMap::new(), JoinSet::new(), BTreeMap::new());
-        Self { shared, number, orders, slots, seen: 0, running, recent, clock: 0 }
+        Self { shared, number, drain, slots, seen: 0, running, recent, clock: 0 }
     }
 
     pub(super) async fn run(mut self) {
@@ -54,8 +55,8 @@ impl<S: Store> Partition<S> {
         let mut events: Option<Subscription> = None;
         let mut look = tokio::time::interval(self.shared.settings.look);
         look.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        let mut orders = self.orders.clone();
-        while *orders.borrow_and_update() == Order::Go {
+        let mut drain = self.drain.clone();
+        while !*drain.borrow_and_update() {
             // A robot works until its events are handled and its plans found.
             if self.running.is_empty() && reached != self.seen {
                 reached = self.seen;
@@ -77,7 +78,7 @@ impl<S: Store> Partition<S> {
                     // The worker starts the partition again.
                     Err(_) => return,
                 },
-                _ = orders.changed() => {}
+                _ = drain.changed() => {}
                 _ = look.tick() => self.discard(false),
                 message = next(&mut events) => {
                     if let Some(Ok(event)) = message {
@@ -127,7 +128,7 @@ impl<S: Store> Partition<S> {
     }
 
     fn start(&mut self, runner: Box<Runner<S>>) {
-        let run = runner.run(self.orders.clone());
+        let run = runner.run(self.drain.clone());
         self.running.spawn(async { Some(run.await) });
     }
 

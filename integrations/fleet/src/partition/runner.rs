@@ -9,7 +9,7 @@ use futures::future::{BoxFuture, FutureExt as _};
 use metaplan::mapek::{ParallelSearch, SearchHandle, Thinker, Thoughts};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, watch};
 
-use super::{Order, Shared, pause, persist};
+use super::{Shared, pause, persist};
 use crate::missions::Missions;
 use crate::robot::{Begun, Refused, Robot, Undecided, is_retirement};
 use crate::store::{Fault, Message, Store, Stored, Stream};
@@ -148,9 +148,9 @@ impl<S: Store> Runner<S> {
         self.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission().is_none())
     }
 
-    /// Works until there are no events and no plan is pending, or the partition is given back. Then discards handled
-    /// events if they are due.
-    pub(super) async fn run(mut self: Box<Self>, mut orders: watch::Receiver<Order>) -> Box<Self> {
+    /// Works until there are no events and no plan is pending, or `drain` becomes true. Then discards handled events if
+    /// they are due.
+    pub(super) async fn run(mut self: Box<Self>, mut drain: watch::Receiver<bool>) -> Box<Self> {
         while self.has_events() || self.is_pending || self.plans.is_some() {
             if self.is_pending && self.plans.is_none() && !self.has_events() {
                 let outcome = self.start_planning().await;
@@ -160,7 +160,7 @@ impl<S: Store> Runner<S> {
             let Self { queue, plans, .. } = &mut *self;
             tokio::select! {
                 biased;
-                () = drained(&mut orders) => break,
+                () = drained(&mut drain) => break,
                 plans = join(plans) => self.conclude(plans).await,
                 Some(queued) = queue.recv() => self.handle(queued).await,
             }
@@ -168,7 +168,7 @@ impl<S: Store> Runner<S> {
                 self.discard().await;
             }
         }
-        let is_draining = *orders.borrow() == Order::Drain;
+        let is_draining = *drain.borrow();
         if is_draining {
             // The next owner plans.
             self.search.interrupt();
@@ -448,13 +448,11 @@ async fn join(plans: &mut Option<BoxFuture<'static, Plans>>) -> Plans {
     }
 }
 
-/// Waits for the order to give the partition back.
-async fn drained(orders: &mut watch::Receiver<Order>) {
-    while *orders.borrow_and_update() != Order::Drain {
-        if orders.changed().await.is_err() {
-            // The runner is dropped together with the sender.
-            std::future::pending::<()>().await;
-        }
+/// Waits until the partition is given back.
+async fn drained(drain: &mut watch::Receiver<bool>) {
+    if drain.wait_for(|is_draining| *is_draining).await.is_err() {
+        // The runner is dropped together with the sender.
+        std::future::pending::<()>().await;
     }
 }
 

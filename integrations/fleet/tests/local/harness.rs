@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
 use metaplan_fleet::missions::Missions;
-use metaplan_fleet::partition::{Order, Settings, Shared, serve};
+use metaplan_fleet::partition::{Settings, Shared, serve};
 use metaplan_fleet::robots::Sender;
 use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::{Message, Store, Stored, Stream};
@@ -197,16 +197,16 @@ impl Client {
 }
 
 /// An owner of the first partition, which is aborted at the end.
-pub(super) struct Owner(watch::Sender<Order>, JoinHandle<()>);
+pub(super) struct Owner(watch::Sender<bool>, JoinHandle<()>);
 
 impl Owner {
     pub(super) fn start<S: Store>(shared: Arc<Shared<S>>) -> Self {
-        let (orders, receiver) = watch::channel(Order::Go);
-        Self(orders, tokio::spawn(serve(shared, 0, receiver)))
+        let (drain, receiver) = watch::channel(false);
+        Self(drain, tokio::spawn(serve(shared, 0, receiver)))
     }
 
     pub(super) async fn drain(mut self) {
-        self.0.send_replace(Order::Drain);
+        self.0.send_replace(true);
         let end = tokio::time::timeout(LIMIT, &mut self.1).await;
         end.expect("it ends in time").expect("no panic");
     }
