@@ -68,8 +68,8 @@ impl Session {
         }
         if ranges.len() > MAX_RANGES {
             let lowest = ranges.remove(0);
-            let other = merged.unwrap_or_else(|| ranges.remove(0));
-            *merged = Some((lowest.0.min(other.0), lowest.1.max(other.1)));
+            let second = merged.unwrap_or_else(|| ranges.remove(0));
+            *merged = Some((lowest.0.min(second.0), lowest.1.max(second.1)));
         }
     }
 }

@@ -217,8 +217,8 @@ mod tests {
             Decided { event: 7, now: 12, enrolled, planning: true, answers, state, ..Decided::default() };
         let text = serde_json::to_vec(&decided).expect("plain data");
         assert_eq!(Decided::parse(&text).as_ref(), Some(&decided));
-        let other = String::from_utf8_lossy(&text).replace("metaplan-fleet/2", "metaplan-fleet/0");
-        for wrong in [&text[..50], other.as_bytes(), b"\xff"] {
+        let outdated = String::from_utf8_lossy(&text).replace("metaplan-fleet/2", "metaplan-fleet/0");
+        for wrong in [&text[..50], outdated.as_bytes(), b"\xff"] {
             assert_eq!(Decided::parse(wrong), None);
         }
     }

@@ -62,10 +62,10 @@ impl Threads {
         let (class, permit) = self.enter(mission, estimate).await;
         let (send, mut outcome) = oneshot::channel();
         let thread = Arc::new(AtomicI32::new(0));
-        let own = Arc::clone(&thread);
+        let number = Arc::clone(&thread);
         let timed = move || {
-            own.store(thread_number(), Ordering::Relaxed);
-            set_niceness(&own, class);
+            number.store(thread_number(), Ordering::Relaxed);
+            set_niceness(&number, class);
             let begun = Instant::now();
             // The receiver is gone if the partition was given back.
             let _ = send.send((work(), begun.elapsed()));

@@ -92,6 +92,10 @@ pub enum Fault {
     Unreachable(String),
 }
 
+fn failed(error: impl std::fmt::Display) -> Fault {
+    Fault::Unreachable(error.to_string())
+}
+
 /// Endless stream of the messages of a partition.
 pub type Subscription = BoxStream<'static, Result<Stored, Fault>>;
 

@@ -23,7 +23,7 @@ use futures::stream::BoxStream;
 use futures::{StreamExt as _, TryStreamExt as _};
 use metaplan::message::Message as Diagnostic;
 
-use super::{Fault, Message, Receipt, Store, Stored, Stream, Subscription};
+use super::{Fault, Message, Receipt, Store, Stored, Stream, Subscription, failed};
 use crate::wire::{Presence, is_name};
 
 /// Settings for the connection to NATS servers, which are also options of the program.
@@ -94,10 +94,6 @@ pub struct Nats {
     prefix: String,
     streams: Vec<stream::Stream>,
     workers: kv::Store,
-}
-
-fn failed(error: impl std::fmt::Display) -> Fault {
-    Fault::Unreachable(error.to_string())
 }
 
 /// Returns `true` if servers that have not finished starting can cause an error of this kind.
