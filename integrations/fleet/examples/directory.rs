@@ -1,6 +1,5 @@
-//! Example: a fleet of two robots whose events and decisions are stored in a local directory instead
-//! of on a server. Each robot enrols, one loses its Kinect sensor, and the program prints the decision
-//! on the last event of each robot.
+//! Example: a fleet of two robots whose events and decisions are stored in a local directory instead of on a server. Each
+//! robot enrols, one loses its Kinect sensor, and the program prints the decision on the last event of each robot.
 
 #![expect(clippy::print_stdout, reason = "an example prints")]
 

@@ -1,12 +1,17 @@
 //! Message ids of a robot's decided events, by which repeated messages are recognised without a
 //! time limit. The servers recognise repetitions only for some minutes.
 //!
-//! An id is a text followed by a number, as in `ugv-1:17` and `ugv-1:7f3a.17`. For each text, the
-//! numbers are stored as ranges; numbers that grow by one are a single range. If there are more
-//! ranges than `MAX_RANGES`, the lowest ones count as one range. Only the `MAX_SESSIONS` texts with
-//! the latest insertions are kept.
+//! An id is a text followed by a number, as in `ugv-1:17` and `ugv-1:7f3a.17`. For each text, the numbers are stored as
+//! ranges; numbers that grow by one are a single range. A text that is longer than `MAX_LENGTH` is stored as its SHA-256
+//! digest. Only the `MAX_SESSIONS` texts with the latest insertions are kept.
+//!
+//! If there are more ranges than `MAX_RANGES`, the two lowest ones are merged. The merged range also contains numbers
+//! that were not inserted. So an event with such a number may have been decided, and must not be decided (again).
+
+use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
 
 const MAX_SESSIONS: usize = 16;
 
@@ -14,14 +19,60 @@ const MAX_RANGES: usize = 16;
 
 const MAX_LENGTH: usize = 128;
 
-/// Approximate set of message ids. It forgets the texts whose last insertion is longest ago, and
-/// also contains the numbers between merged ranges.
+/// Set of message ids, of which it forgets some.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ids(Vec<Session>);
 
-/// Inclusive ranges of the numbers that follow a text, in ascending order.
+/// Membership of an id in [`Ids`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Membership {
+    /// The id was not inserted, or is forgotten with its text.
+    Absent,
+    /// The id was inserted.
+    Present,
+    /// The number lies in a merged range, so the id may have been inserted.
+    Unclear,
+}
+
+/// A text with the inclusive ranges of the numbers that follow it: in ascending order, and the merged one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-struct Session(String, Vec<(u64, u64)>);
+struct Session(
+    String,
+    Vec<(u64, u64)>,
+    #[serde(default, skip_serializing_if = "Option::is_none")] Option<(u64, u64)>,
+);
+
+impl Session {
+    fn membership(&self, number: u64) -> Membership {
+        let contains = |(first, last): &(u64, u64)| (*first..=*last).contains(&number);
+        match self {
+            Self(_, ranges, _) if ranges.iter().any(contains) => Membership::Present,
+            Self(_, _, Some(merged)) if contains(merged) => Membership::Unclear,
+            _ => Membership::Absent,
+        }
+    }
+
+    fn insert(&mut self, number: u64) {
+        if self.membership(number) != Membership::Absent {
+            return;
+        }
+        let Self(_, ranges, merged) = self;
+        let position = ranges.partition_point(|(_, last)| *last < number);
+        ranges.insert(position, (number, number));
+        // If a range follows, `number` is less than its first number, so `number + 1` cannot overflow.
+        if ranges.get(position + 1).is_some_and(|(first, _)| *first == number + 1) {
+            ranges[position].1 = ranges.remove(position + 1).1;
+        }
+        if position > 0 && ranges[position - 1].1 + 1 == number {
+            ranges[position - 1].1 = ranges.remove(position).1;
+        }
+        if ranges.len() > MAX_RANGES {
+            let lowest = ranges.remove(0);
+            let second = merged.unwrap_or_else(|| ranges.remove(0));
+            *merged = Some((lowest.0.min(second.0), lowest.1.max(second.1)));
+        }
+    }
+}
 
 impl Ids {
     /// Returns `true` if no id is stored.
@@ -29,40 +80,32 @@ impl Ids {
         self.0.is_empty()
     }
 
-    /// Returns `true` if the id was inserted and is not forgotten, or if its number lies between
-    /// merged ranges.
-    pub fn contains(&self, id: &str) -> bool {
+    /// Returns whether the set contains an id.
+    pub fn membership(&self, id: &str) -> Membership {
         let (text, number) = split(id);
+        let text = stored_text(text);
         let session = self.0.iter().find(|session| session.0 == text);
-        session.is_some_and(|Session(_, ranges)| {
-            ranges.iter().any(|(first, last)| (*first..=*last).contains(&number))
-        })
+        session.map_or(Membership::Absent, |session| session.membership(number))
     }
 
-    /// Adds an id, if there is one.
-    pub fn extend(&mut self, id: Option<&str>) {
-        if let Some(id) = id {
-            self.insert(id);
-        }
-    }
-
-    /// Adds an id, unless its text is longer than 128 bytes.
+    /// Adds an id.
     pub fn insert(&mut self, id: &str) {
         let (text, number) = split(id);
-        if text.len() > MAX_LENGTH {
-            return;
-        }
+        let text = stored_text(text);
         let position = self.0.iter().position(|session| session.0 == text);
-        let mut session = match position {
-            Some(position) => self.0.remove(position),
-            None => Session(text.to_owned(), Vec::new()),
-        };
-        add(&mut session.1, number);
+        let session = position.map(|position| self.0.remove(position));
+        let mut session = session.unwrap_or_else(|| Session(text.into_owned(), Vec::new(), None));
+        session.insert(number);
         self.0.push(session);
         if self.0.len() > MAX_SESSIONS {
             self.0.remove(0);
         }
     }
+}
+
+/// Returns a short text as it is, and the digest of a longer one. Ids of robots do not begin with `#`.
+fn stored_text(text: &str) -> Cow<'_, str> {
+    if text.len() > MAX_LENGTH { format!("#{:x}", Sha256::digest(text)).into() } else { text.into() }
 }
 
 /// Splits an id into a text and the number at its end (up to 19 digits). Leading zeros belong to the text. The number
@@ -80,30 +123,15 @@ fn split(id: &str) -> (&str, u64) {
     }
 }
 
-fn add(ranges: &mut Vec<(u64, u64)>, number: u64) {
-    let position = ranges.partition_point(|(_, last)| *last < number);
-    if ranges.get(position).is_some_and(|(first, _)| *first <= number) {
-        return;
-    }
-    ranges.insert(position, (number, number));
-    // If a range follows, `number` is less than its first number, so `number + 1` cannot overflow.
-    if ranges.get(position + 1).is_some_and(|(first, _)| *first == number + 1) {
-        ranges[position].1 = ranges.remove(position + 1).1;
-    }
-    if position > 0 && ranges[position - 1].1 + 1 == number {
-        ranges[position - 1].1 = ranges.remove(position).1;
-    }
-    if ranges.len() > MAX_RANGES {
-        let first = ranges.remove(0).0;
-        ranges[0].0 = first;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
+
+    fn contains(ids: &Ids, id: &str) -> bool {
+        ids.membership(id) == Membership::Present
+    }
 
     #[test]
     fn different_ids_are_split_differently() {
@@ -121,12 +149,12 @@ mod tests {
         let mut ids = Ids::default();
         for number in 1..=100_000 {
             let id = format!("r:s.{number}");
-            assert!(!ids.contains(&id));
+            assert!(!contains(&ids, &id));
             ids.insert(&id);
         }
         assert_eq!(serde_json::to_string(&ids).expect("plain data"), r#"[["r:s.",[[1,100000]]]]"#);
-        assert!(ids.contains("r:s.1") && ids.contains("r:s.99999") && !ids.contains("r:s.100001"));
-        assert!(!ids.contains("r:t.1"));
+        assert!(contains(&ids, "r:s.1") && contains(&ids, "r:s.99999") && !contains(&ids, "r:s.100001"));
+        assert!(!contains(&ids, "r:t.1"));
     }
 
     #[test]
@@ -139,7 +167,7 @@ mod tests {
             // Within the ranges that are kept apart, numbers can arrive in any order.
             let number = base - random.u64(0..4);
             let id = format!("r:{number}");
-            assert_eq!(ids.contains(&id), !seen.insert(number), "{number}");
+            assert_eq!(contains(&ids, &id), !seen.insert(number), "{number}");
             ids.insert(&id);
             assert!(ids.0[0].1.len() <= MAX_RANGES);
             assert!(ids.0[0].1.windows(2).all(|pair| pair[0].1 + 1 < pair[1].0), "{ids:?}");
@@ -148,8 +176,45 @@ mod tests {
             ids.insert(&format!("r:{session}.1"));
         }
         assert_eq!(ids.0.len(), MAX_SESSIONS);
-        assert!(ids.contains("r:99.1") && !ids.contains("r:83.1"));
-        ids.insert(&"x".repeat(1000));
-        assert_eq!(ids.0.len(), MAX_SESSIONS);
+        assert!(contains(&ids, "r:99.1") && !contains(&ids, "r:83.1"));
+    }
+
+    #[test]
+    fn only_numbers_between_merged_ranges_are_unclear() {
+        use Membership::{Absent, Present, Unclear};
+        let mut ids = Ids::default();
+        // 17 ranges, of which the two lowest ones are merged to 10..=12.
+        for number in (10..=42).step_by(2) {
+            ids.insert(&format!("r:{number}"));
+        }
+        let stored = serde_json::to_string(&ids).expect("plain data");
+        assert!(stored.ends_with(",[42,42]],[10,12]]]"), "{stored}");
+        let mut ids: Ids = serde_json::from_str(&stored).expect("it is stored so");
+        let memberships = |ids: &Ids, numbers: &[u64]| -> Vec<Membership> {
+            numbers.iter().map(|number| ids.membership(&format!("r:{number}"))).collect()
+        };
+        let expected = [Absent, Unclear, Unclear, Unclear, Absent, Present, Absent, Present];
+        assert_eq!(memberships(&ids, &[9, 10, 11, 12, 13, 14, 15, 42]), expected);
+        // There are 15 further ranges, so this is the sixteenth one, and the next one is merged.
+        ids.insert("r:5");
+        assert_eq!(memberships(&ids, &[5, 6, 10]), [Present, Absent, Unclear]);
+        ids.insert("r:44");
+        assert_eq!(
+            memberships(&ids, &[4, 5, 6, 12, 13, 14]),
+            [Absent, Unclear, Unclear, Unclear, Absent, Present]
+        );
+    }
+
+    #[test]
+    fn long_texts_are_stored_as_digests() {
+        let mut ids = Ids::default();
+        let texts = ["x".repeat(1000), "x".repeat(1001), "y".repeat(1000)];
+        ids.insert(&format!("{}7", texts[0]));
+        let stored = serde_json::to_string(&ids).expect("plain data");
+        assert!(stored.len() < 100, "{stored}");
+        let ids: Ids = serde_json::from_str(&stored).expect("it is stored so");
+        let expected = [[true, false], [false, false], [false, false]];
+        let contained = texts.map(|text| [7, 8].map(|number| contains(&ids, &format!("{text}{number}"))));
+        assert_eq!(contained, expected);
     }
 }

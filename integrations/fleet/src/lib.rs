@@ -12,43 +12,7 @@
 //! division of partitions is for efficiency, and the chain of decisions guarantees correctness.
 //!
 //! ```
-//! use std::{path::Path, sync::Arc, time::Duration};
-//!
-//! use metaplan_fleet::missions::Missions;
-//! use metaplan_fleet::partition::{Settings, Shared};
-//! use metaplan_fleet::robots::Sender;
-//! use metaplan_fleet::store::{Store as _, Stream, local::Local};
-//! use metaplan_fleet::{wire::Decided, worker};
-//!
-//! # #[tokio::main]
-//! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let folder = tempfile::tempdir()?;
-//! # let directory = folder.path();
-//! let store = Local::open(directory, 4, 8, Duration::from_secs(2))?;
-//! let missions = Missions::read(Path::new("../../missions"))?;
-//! let shared = Arc::new(Shared::new(store.clone(), missions, "worker-1".to_owned(), Settings::default()));
-//! let (stop, stopped) = tokio::sync::watch::channel(false);
-//! let worker = tokio::spawn(worker::run(shared, stopped));
-//!
-//! let mut robot = Sender::new(store.clone(), "ugv-1", "");
-//! let event = robot.send(r#"{"event": "enrol", "mission": "ugv"}"#).await?;
-//! let subject = robot.address().to_string();
-//! // A search that takes longer than `Settings::patience` has a decision of its own, which follows that of the event.
-//! let decided = loop {
-//!     if let Some(message) = store.last(Stream::Decisions, &subject).await? {
-//!         let decided = Decided::parse(&message.payload).ok_or("no decision")?;
-//!         if !decided.planning {
-//!             break decided;
-//!         }
-//!     }
-//!     tokio::time::sleep(Duration::from_millis(10)).await;
-//! };
-//! assert_eq!(decided.event, event);
-//! assert!(decided.answers.iter().any(|answer| answer["answer"] == "plan_found"));
-//! stop.send_replace(true);
-//! worker.await?;
-//! # Ok(())
-//! # }
+#![doc = include_str!("../examples/directory.rs")]
 //! ```
 //!
 //! - [`store`]: the interface of a log, which NATS JetStream and a local directory implement.

@@ -1,6 +1,7 @@
 //! Standard input and output of the program: lines with events and decisions.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::io::{self, Write as _};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -12,10 +13,10 @@ use metaplan::message::Message;
 use metaplan_fleet::partition::Shared;
 use metaplan_fleet::robots::{Sender, Status};
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Fault, Store, Stored, Stream};
-use metaplan_fleet::wire::{Address, Decided, is_name};
+use metaplan_fleet::store::{Store, Stored, Stream};
+use metaplan_fleet::wire::{Address, Decided, Presence, is_name, partition_of};
 use metaplan_fleet::worker;
-use serde_json::{Value, json};
+use serde_json::{Map, Value};
 use tokio::io::{AsyncBufReadExt as _, BufReader, stdin};
 use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{mpsc, watch};
@@ -23,12 +24,20 @@ use tokio::sync::{mpsc, watch};
 /// Maximum number of input lines of a robot that are read but not stored.
 const AHEAD: usize = 1024;
 
-fn fault(fault: &Fault) -> Message {
+fn fault(fault: impl Display) -> Message {
     Message::error("N312", format!("the log cannot be used: {fault}"))
 }
 
-fn unwritten(error: &io::Error) -> Message {
+fn unwritten(error: impl Display) -> Message {
     Message::error("N313", format!("standard output cannot be written: {error}"))
+}
+
+fn unparsed(text: impl Display) -> Message {
+    Message::error("N314", text.to_string())
+}
+
+fn unstored(text: impl Display) -> Message {
+    Message::error("N315", text.to_string())
 }
 
 /// Reads lines `ROBOT EVENT` from standard input until the end of input or until `stop` becomes true,
@@ -45,10 +54,8 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
             line = lines.next_segment() => line,
             _ = stop.changed() => break,
         };
-        let Some(line) = line.map_err(|error| Message::error("N314", format!("standard input: {error}")))?
-        else {
-            break;
-        };
+        let line = line.map_err(|error| unparsed(format_args!("standard input: {error}")))?;
+        let Some(line) = line else { break };
         number += 1;
         let line = String::from_utf8_lossy(&line).trim_start_matches('\u{feff}').trim().to_owned();
         if line.is_empty() {
@@ -56,59 +63,50 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
         }
         let Some((robot, event)) = line.split_once(' ').filter(|(robot, _)| is_name(robot)) else {
             wrong += 1;
-            let text = format!(
+            say(&unparsed(format_args!(
                 "line {number}: a line is `ROBOT EVENT`; a robot's name has letters, digits, `-` and `_` only"
-            );
-            say(&Message::error("N314", text));
+            )));
             continue;
         };
-        if !robots.contains_key(robot) {
-            let (tell, mut told) = mpsc::channel::<(u64, String)>(AHEAD);
-            let mut sender = Sender::new(store.clone(), robot, session);
-            senders.spawn(async move {
-                let (mut stored, mut lost) = (0_u64, 0_u64);
-                while let Some((number, event)) = told.recv().await {
-                    match sender.send(&event).await {
-                        Ok(_) => stored += 1,
-                        Err(own) => {
-                            lost += 1;
-                            let robot = &sender.address().robot;
-                            say(&unstored(format!("line {number}, robot `{robot}`: {own}")));
-                        }
-                    }
-                }
-                (stored, lost)
-            });
-            robots.insert(robot.to_owned(), tell);
-        }
-        if let Some(tell) = robots.get(robot) {
-            // The receiving task ends only after this channel is closed.
-            let _ = tell.send((number, event.to_owned())).await;
-        }
+        let queue = robots.entry(robot.to_owned()).or_insert_with_key(|robot| {
+            let (queue, events) = mpsc::channel(AHEAD);
+            senders.spawn(send_all(Sender::new(store.clone(), robot, session), events));
+            queue
+        });
+        // The receiving task ends only after this channel is closed.
+        let _ = queue.send((number, event.to_owned())).await;
     }
     drop(robots);
     let (mut stored, mut lost) = (0, 0);
     while let Some(counts) = senders.join_next().await {
-        let counts = counts.map_err(|error| unstored(format!("a sender has failed: {error}")))?;
+        let counts = counts.map_err(|error| unstored(format_args!("a sender has failed: {error}")))?;
         (stored, lost) = (stored + counts.0, lost + counts.1);
     }
     match (wrong, lost) {
         (0, 0) => Ok(()),
         (_, 0) => {
-            let text = format!("{wrong} lines could not be parsed; {stored} events were stored");
-            Err(Message::error("N314", text))
+            Err(unparsed(format_args!("{wrong} lines could not be parsed; {stored} events were stored")))
         }
-        _ => {
-            let text = format!(
-                "{lost} events were not stored, {wrong} lines could not be parsed; {stored} events were stored"
-            );
-            Err(unstored(text))
-        }
+        _ => Err(unstored(format_args!(
+            "{lost} events were not stored, {wrong} lines could not be parsed; {stored} events were stored"
+        ))),
     }
 }
 
-fn unstored(text: String) -> Message {
-    Message::error("N315", text)
+/// Sends the events of a robot, which have the numbers of their lines. Prints errors, and returns the numbers of
+/// events that were stored and that were not.
+async fn send_all<S: Store>(mut sender: Sender<S>, mut events: mpsc::Receiver<(u64, String)>) -> (u64, u64) {
+    let (mut stored, mut lost) = (0, 0);
+    while let Some((number, event)) = events.recv().await {
+        if let Err(fault) = sender.send(&event).await {
+            lost += 1;
+            let robot = &sender.address().robot;
+            say(&unstored(format_args!("line {number}, robot `{robot}`: {fault}")));
+        } else {
+            stored += 1;
+        }
+    }
+    (stored, lost)
 }
 
 #[expect(clippy::print_stderr, reason = "it is said while the program goes on")]
@@ -125,107 +123,79 @@ pub(crate) async fn send<S: Store>(store: S, session: &str) -> Result<(), Messag
 /// `None` for other messages.
 fn line(message: &Stored) -> Option<(String, String)> {
     let address = Address::parse(&message.subject)?;
-    let decided = Decided::parse(&message.payload)?;
-    let mut line = json!({"decision": message.sequence, "event": decided.event, "answers": decided.answers});
-    if let (Some(mission), Some(object)) = (decided.enrolled, line.as_object_mut()) {
-        object.insert("enrolled".to_owned(), Value::String(mission));
-    }
-    let Decided { migrated, retired, planning, planned, late, .. } = decided;
-    let flags = [
-        ("migrated", migrated),
-        ("retired", retired),
-        ("planning", planning),
-        ("planned", planned),
-        ("late", late),
-    ];
-    for (name, flag) in flags {
-        if let (true, Some(object)) = (flag, line.as_object_mut()) {
-            object.insert(name.to_owned(), Value::Bool(true));
-        }
-    }
-    Some((address.robot, line.to_string()))
+    Decided::parse(&message.payload)?;
+    let mut line: Map<String, Value> = serde_json::from_slice(&message.payload).ok()?;
+    line.retain(|name, _| !["format", "now", "worker", "state"].contains(&name.as_str()));
+    line.shift_insert(0, "decision".to_owned(), message.sequence.into());
+    Some((address.robot, Value::Object(line).to_string()))
 }
 
-/// Writes the decisions of one robot to standard output, or those of all robots if `robot` is
-/// `None`. Ends when the output is closed or the log fails. Begins after the decision `after`, or
-/// with the next new decision if `after` is `None`.
-pub(crate) async fn follow<S: Store>(
+/// Writes decisions to standard output until it is closed or the log fails.
+pub(crate) struct Writer<S> {
     store: S,
-    robot: Option<&str>,
-    after: Option<u64>,
-) -> Result<(), Message> {
-    let partitions: Vec<u32> = match robot {
-        Some(robot) => vec![Address::of(robot, store.partitions()).partition],
-        None => (0..store.partitions()).collect(),
-    };
-    let reached = Mutex::new(beginning(&store, partitions, after).await?);
-    write_decisions(&store, robot, &reached).await
+    /// `None` for the decisions of all robots.
+    robot: Option<String>,
+    /// Sequence numbers up to which decisions are written, by partition.
+    written: Mutex<BTreeMap<u32, u64>>,
 }
 
-/// Returns for each partition the sequence number after which decisions are written: `after`, or
-/// the current end of the partition.
-async fn beginning<S: Store>(
-    store: &S,
-    partitions: Vec<u32>,
-    after: Option<u64>,
-) -> Result<BTreeMap<u32, u64>, Message> {
-    let mut reached = BTreeMap::new();
-    for partition in partitions {
-        let start = match after {
-            Some(after) => after,
-            None => store.end(Stream::Decisions, partition).await.map_err(|start| fault(&start))?,
+impl<S: Store> Writer<S> {
+    /// Returns a writer that begins after the decision `after`, or with the next new decision if `after` is `None`.
+    pub(crate) async fn new(store: S, robot: Option<String>, after: Option<u64>) -> Result<Self, Message> {
+        let partitions: Vec<u32> = match &robot {
+            Some(robot) => vec![partition_of(robot, store.partitions())],
+            None => (0..store.partitions()).collect(),
         };
-        reached.insert(partition, start);
+        let mut written = BTreeMap::new();
+        for partition in partitions {
+            let start = match after {
+                Some(after) => after,
+                None => store.end(Stream::Decisions, partition).await.map_err(fault)?,
+            };
+            written.insert(partition, start);
+        }
+        Ok(Self { store, robot, written: Mutex::new(written) })
     }
-    Ok(reached)
-}
 
-/// Writes the decisions after the sequence numbers in `reached`, by partition, of one robot or of all robots
-/// if `robot` is `None`. Updates `reached`. Ends when the output is closed or the log fails.
-async fn write_decisions<S: Store>(
-    store: &S,
-    robot: Option<&str>,
-    reached: &Mutex<BTreeMap<u32, u64>>,
-) -> Result<(), Message> {
-    loop {
-        let from = reached.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let mut streams = Vec::new();
-        for (partition, after) in from {
-            let stream =
-                store.follow(Stream::Decisions, partition, after).await.map_err(|own| fault(&own))?;
-            streams.push(stream.map(move |message| (partition, message)).boxed());
-        }
-        let mut decisions = select_all(streams);
-        while let Some((partition, message)) = decisions.next().await {
-            // The subscription was interrupted and is started again.
-            let Ok(message) = message else { break };
-            if let Some((name, text)) = line(&message)
-                && robot.is_none_or(|robot| robot == name)
-            {
-                let mut out = io::stdout().lock();
-                match writeln!(out, "{name} {text}").and_then(|()| out.flush()) {
-                    Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
-                    other => other.map_err(|error| unwritten(&error))?,
-                }
+    pub(crate) async fn run(&self) -> Result<(), Message> {
+        loop {
+            let from = self.written.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let mut streams = Vec::new();
+            for (partition, after) in from {
+                let stream = self.store.follow(Stream::Decisions, partition, after).await.map_err(fault)?;
+                streams.push(stream.map(move |message| (partition, message)).boxed());
             }
-            let mut reached = reached.lock().unwrap_or_else(PoisonError::into_inner);
-            reached.insert(partition, message.sequence);
+            let mut decisions = select_all(streams);
+            while let Some((partition, message)) = decisions.next().await {
+                // The subscription was interrupted and is started again.
+                let Ok(message) = message else { break };
+                if let Some((name, text)) = line(&message)
+                    && self.robot.as_ref().is_none_or(|robot| *robot == name)
+                {
+                    let mut out = io::stdout().lock();
+                    match writeln!(out, "{name} {text}").and_then(|()| out.flush()) {
+                        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
+                        other => other.map_err(unwritten)?,
+                    }
+                }
+                let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+                written.insert(partition, message.sequence);
+            }
+            tokio::time::sleep(Duration::from_millis(fastrand::u64(50..500))).await;
         }
-        tokio::time::sleep(Duration::from_millis(fastrand::u64(50..500))).await;
     }
 }
 
 /// Runs a fleet in a directory: events from standard input, decisions to standard output. Ends when
 /// `stop` becomes true, or when the input has ended and either all events are decided (except those of
-/// suspended robots) or the output is closed. `after` is as in [`follow`].
+/// suspended robots) or the output is closed. `after` is as in [`Writer::new`].
 pub(crate) async fn up(
     shared: Arc<Shared<Local>>,
     after: Option<u64>,
     mut stop: watch::Receiver<bool>,
 ) -> Result<(), Message> {
     let store = shared.store.clone();
-    let partitions = (0..store.partitions()).collect();
-    let written = Arc::new(Mutex::new(beginning(&store, partitions, after).await?));
+    let writer = Arc::new(Writer::new(store.clone(), None, after).await?);
     let mut notices = store.notices();
     tokio::spawn(async move {
         while let Some(message) = warning(notices.recv().await) {
@@ -234,13 +204,13 @@ pub(crate) async fn up(
     });
     let (order, orders) = watch::channel(false);
     let working = tokio::spawn(worker::run(Arc::clone(&shared), orders));
-    let (reader, progress) = (store.clone(), Arc::clone(&written));
-    let writing = tokio::spawn(async move { write_decisions(&reader, None, &progress).await });
+    let running = Arc::clone(&writer);
+    let writing = tokio::spawn(async move { running.run().await });
     let session = format!("{:016x}.", fastrand::u64(..));
     let fed = feed(&store, &session, stop.clone()).await;
     // Waits until all stored events are decided and all decisions written, unless the program is
     // stopped or the output is closed.
-    while !*stop.borrow_and_update() && !writing.is_finished() && !is_done(&shared, &written).await? {
+    while !*stop.borrow_and_update() && !writing.is_finished() && !is_done(&shared, &writer.written).await? {
         tokio::select! {
             _ = stop.changed() => {}
             () = tokio::time::sleep(Duration::from_millis(20)) => {}
@@ -274,13 +244,12 @@ fn warning(received: Result<(String, String), RecvError>) -> Option<Message> {
 
 /// Returns `true` if all stored events are decided, refused, or of a suspended robot, and all decisions are written.
 async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) -> Result<bool, Message> {
-    let store = &shared.store;
-    for partition in 0..store.partitions() {
-        let at = |all: &Mutex<BTreeMap<u32, u64>>| {
-            all.lock().unwrap_or_else(PoisonError::into_inner).get(&partition).copied().unwrap_or_default()
-        };
-        for (stream, all) in [(Stream::Events, &shared.counts.reached), (Stream::Decisions, written)] {
-            if store.end(stream, partition).await.map_err(|own| fault(&own))? > at(all) {
+    // Events come first: their decisions are stored when they are decided.
+    for (stream, positions) in [(Stream::Events, &shared.counts.reached), (Stream::Decisions, written)] {
+        for partition in 0..shared.store.partitions() {
+            let end = shared.store.end(stream, partition).await.map_err(fault)?;
+            let positions = positions.lock().unwrap_or_else(PoisonError::into_inner);
+            if positions.get(&partition).copied().unwrap_or_default() < end {
                 return Ok(false);
             }
         }
@@ -294,44 +263,32 @@ pub(crate) fn status(status: &Status, as_json: bool) -> Result<(), Message> {
     } else {
         status_text(status)
     };
-    io::stdout().write_all(text.as_bytes()).map_err(|error| unwritten(&error))
+    io::stdout().write_all(text.as_bytes()).map_err(unwritten)
 }
 
 fn status_text(status: &Status) -> String {
-    let mut workers = Table::new();
-    workers.load_style(TableStyle::new()).set_header([
-        "worker",
-        "partitions",
-        "robots",
-        "waiting",
-        "decided",
-        "refused",
-        "load",
-        "",
-    ]);
-    for (name, own) in &status.workers {
-        workers.add_row([
-            name.clone(),
-            own.partitions.to_string(),
-            own.robots.to_string(),
-            own.waiting.to_string(),
-            own.decided.to_string(),
-            own.refused.to_string(),
-            format!("{:.0} %", own.load * 100.0),
-            if own.draining { "is ending".to_owned() } else { String::new() },
-        ]);
-    }
-    let mut partitions = Table::new();
-    partitions.load_style(TableStyle::new()).set_header(["partition", "worker"]);
-    for own in &status.partitions {
-        partitions
-            .add_row([own.partition.to_string(), own.worker.clone().unwrap_or_else(|| "nobody".to_owned())]);
-    }
-    for table in [&mut workers, &mut partitions] {
+    let table = |header: &[&str], rows: Vec<Vec<String>>| {
+        let mut table = Table::new();
+        table.load_style(TableStyle::new()).set_header(header).add_rows(rows);
         for column in table.column_iter_mut().skip(1) {
             column.set_cell_alignment(CellAlignment::Right);
         }
-    }
+        table
+    };
+    let workers = status.workers.iter().map(|(name, worker)| {
+        let Presence { partitions, robots, waiting, decided, refused, load, draining } = worker;
+        let counts = [&u64::from(*partitions), robots, waiting, decided, refused].map(u64::to_string);
+        let load = format!("{:.0} %", load * 100.0);
+        let is_ending = if *draining { "is ending" } else { "" };
+        [vec![name.clone()], counts.to_vec(), vec![load, is_ending.to_owned()]].concat()
+    });
+    let header = ["worker", "partitions", "robots", "waiting", "decided", "refused", "load", ""];
+    let workers = table(&header, workers.collect());
+    let partitions = status.partitions.iter().map(|partition| {
+        let worker = partition.worker.as_deref().unwrap_or("nobody");
+        vec![partition.partition.to_string(), worker.to_owned()]
+    });
+    let partitions = table(&["partition", "worker"], partitions.collect());
     format!("{workers}\n\n{partitions}\n")
 }
 

@@ -16,7 +16,7 @@ use metaplan_fleet::partition::{Settings, Shared};
 use metaplan_fleet::robots::status;
 use metaplan_fleet::store::Store;
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::nats::{Access, DEFAULT_FLEET, Layout, Nats};
+use metaplan_fleet::store::nats::{Access, Layout, Nats};
 use metaplan_fleet::wire::is_name;
 use metaplan_fleet::worker;
 use tokio::sync::watch;
@@ -24,9 +24,6 @@ use tracing::level_filters::LevelFilter;
 
 mod endpoints;
 mod lines;
-
-/// Default number of decisions of each robot that are kept.
-const HISTORY: u32 = 8;
 
 /// Run the adaptation loops of many robots, on NATS JetStream or in one directory without a server.
 ///
@@ -68,7 +65,7 @@ enum Command {
         /// Set the number of partitions if the directory is created.
         partitions: u32,
         /// Keep this number of decisions of each robot.
-        #[arg(long, value_name = "N", default_value_t = HISTORY, value_parser = clap::value_parser!(u32).range(1..))]
+        #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..))]
         history: u32,
     },
     /// Store events, which are lines `ROBOT EVENT` from standard input.
@@ -126,36 +123,10 @@ struct Work {
 /// Options of the connection to the servers.
 #[derive(Debug, Args)]
 struct Server {
-    /// Connect to these servers: `nats://HOST:PORT` or `tls://HOST:PORT`, separated by commas.
-    #[arg(long, value_name = "URL", env = "NATS_URL")]
-    nats: String,
-    /// Authenticate with a credentials file of NATS.
-    #[arg(long, value_name = "FILE")]
-    creds: Option<PathBuf>,
-    /// Authenticate as this user, with the password in the environment variable `NATS_PASSWORD`.
-    #[arg(long, value_name = "NAME")]
-    user: Option<String>,
-    /// Trust the certificate authorities in this file in addition to those of the system.
-    #[arg(long, value_name = "FILE")]
-    tls_ca: Option<PathBuf>,
-    /// Authenticate with the client certificate in the first file and its key in the second file.
-    #[arg(long, value_names = ["CERTIFICATE", "KEY"], num_args = 2)]
-    tls_cert: Vec<PathBuf>,
-    /// Set the name of the fleet. Its streams, buckets and subjects begin with this name, except for subjects of the fleet `fleet`.
-    #[arg(long, value_name = "NAME", default_value = DEFAULT_FLEET)]
-    fleet: String,
-    /// Set the number of partitions if the fleet is created. It cannot be changed later.
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65536))]
-    partitions: u32,
-    /// Set the number of servers that store the data (1, 3 or 5) if the fleet is created.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    replicas: usize,
-    /// Keep this number of decisions of each robot, if the fleet is created.
-    #[arg(long, value_name = "N", default_value_t = HISTORY, value_parser = clap::value_parser!(u32).range(1..))]
-    history: u32,
-    /// Set the time in seconds after which a silent worker loses its partitions if the fleet is created.
-    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(2..=3600))]
-    lease: u64,
+    #[command(flatten)]
+    access: Access,
+    #[command(flatten)]
+    layout: Layout,
     /// Wait this many seconds for servers that are starting. [default: 60 for `worker`, 10 otherwise]
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u64).range(..=86_400))]
     wait: Option<u64>,
@@ -163,27 +134,8 @@ struct Server {
 
 impl Server {
     async fn open(&self, default_wait: u64) -> Result<Nats, Message> {
-        let certificate = match self.tls_cert.as_slice() {
-            [certificate, key] => Some((certificate.clone(), key.clone())),
-            _ => None,
-        };
-        let password = std::env::var("NATS_PASSWORD").unwrap_or_default();
-        let access = Access {
-            url: self.nats.clone(),
-            credentials: self.creds.clone(),
-            user: self.user.clone().map(|user| (user, password)),
-            authorities: self.tls_ca.clone(),
-            certificate,
-        };
-        let lease = Duration::from_secs(self.lease);
-        let (fleet, partitions, replicas) = (self.fleet.clone(), self.partitions, self.replicas);
         let patience = Duration::from_secs(self.wait.unwrap_or(default_wait));
-        Nats::open(
-            &access,
-            &Layout { fleet, partitions, replicas, history: self.history.into(), lease },
-            patience,
-        )
-        .await
+        Nats::open(&self.access, &self.layout, patience).await
     }
 }
 
@@ -200,7 +152,7 @@ impl Work {
     async fn open_endpoints(&self) -> Result<Arc<Health>, Errors> {
         let health = Arc::<Health>::default();
         if let Some(address) = self.metrics {
-            endpoints::open(address, Arc::clone(&health)).await.map_err(|message| vec![message])?;
+            endpoints::open(address, Arc::clone(&health)).await?;
         }
         Ok(health)
     }
@@ -258,37 +210,32 @@ async fn run(command: Command) -> Result<(), Errors> {
             // The endpoints are opened first, so that probes can distinguish a worker that waits for its servers from
             // one that hangs.
             let health = work.open_endpoints().await?;
-            let store = server.open(60).await.map_err(|message| vec![message])?;
-            let name = name.unwrap_or_else(own_name);
-            let shared = work.shared(store, name, health)?;
+            let store = server.open(60).await?;
+            let shared = work.shared(store, name.unwrap_or_else(own_name), health)?;
             worker::run(shared, signals()?).await;
         }
         Command::Up { local, after, work, partitions, history } => {
-            let lease = Duration::from_secs(10);
-            let store =
-                Local::open(&local, partitions, history as usize, lease).map_err(|message| vec![message])?;
+            let store = Local::open(&local, partitions, history as usize, Duration::from_secs(10))?;
             let health = work.open_endpoints().await?;
             let shared = work.shared(store, own_name(), health)?;
-            lines::up(shared, after, signals()?).await.map_err(|message| vec![message])?;
+            lines::up(shared, after, signals()?).await?;
         }
         Command::Send { server, session } => {
-            let store = server.open(10).await.map_err(|message| vec![message])?;
-            lines::send(store, &id_prefix(session)).await.map_err(|message| vec![message])?;
+            lines::send(server.open(10).await?, &id_prefix(session)).await?;
         }
         Command::Follow { server, robot, after } => {
-            let store = server.open(10).await.map_err(|message| vec![message])?;
+            let writer = lines::Writer::new(server.open(10).await?, robot, after).await?;
             let mut stop = signals()?;
             tokio::select! {
-                done = lines::follow(store, robot.as_deref(), after) => done.map_err(|message| vec![message])?,
+                done = writer.run() => done?,
                 _ = stop.changed() => {}
             }
         }
         Command::Status { server, format } => {
-            let store = server.open(10).await.map_err(|message| vec![message])?;
-            let status = status(&store).await.map_err(|fault| {
-                vec![Message::error("N312", format!("the status of the fleet cannot be read: {fault}"))]
+            let status = status(&server.open(10).await?).await.map_err(|fault| {
+                Message::error("N312", format!("the status of the fleet cannot be read: {fault}"))
             })?;
-            lines::status(&status, format == "json").map_err(|message| vec![message])?;
+            lines::status(&status, format == "json")?;
         }
     }
     Ok(())
@@ -315,7 +262,7 @@ fn own_name() -> String {
 
 /// Returns a flag that becomes true on the first SIGINT, SIGTERM or SIGHUP. A second signal ends the program
 /// immediately.
-fn signals() -> Result<watch::Receiver<bool>, Errors> {
+fn signals() -> Result<watch::Receiver<bool>, Message> {
     let (stop, heard) = watch::channel(false);
     let handler = move || {
         if stop.send_replace(true) {
@@ -323,7 +270,7 @@ fn signals() -> Result<watch::Receiver<bool>, Errors> {
         }
     };
     ctrlc::set_handler(handler).map_err(|error| {
-        vec![Message::error("N302", format!("the signal handler cannot be installed: {error}"))]
+        Message::error("N302", format!("the signal handler cannot be installed: {error}"))
     })?;
     Ok(heard)
 }

@@ -6,30 +6,23 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use metaplan::mapek::{Answer, Baseline, Loop, Observation, Thinker, Thoughts};
+use serde::Deserialize;
 use serde_json::Value;
 
-use crate::ids::Ids;
+use crate::ids::Membership;
 use crate::missions::{Missions, Template};
 use crate::store::Stored;
-use crate::wire::{Decided, FORMAT, Migration, SafePoint, State};
+use crate::wire::{Decided, Migration, SafePoint, State};
 
 /// State of a robot. Events that are not decided yet are not part of it.
 #[derive(Debug, Default)]
 pub struct Robot {
-    /// Name of the robot's mission; `None` if the robot is not enrolled.
-    pub mission: Option<String>,
     /// Sequence number of the last event that was decided.
     pub event: u64,
-    /// Checksum of the version of the robot's mission.
-    digest: String,
-    /// Time of enrolment in microseconds since 1970.
-    enrolled: u64,
     /// Time between enrolment and the last event that was decided, in microseconds.
     now: u64,
-    /// Ids of decided events.
-    ids: Ids,
-    /// Requested change to another version of the mission.
-    migration: Option<Migration>,
+    /// State after the last decision. The snapshot is that of a loop that is not loaded yet.
+    state: State,
     control: Control,
 }
 
@@ -39,29 +32,42 @@ enum Control {
     None,
     /// The loop, and the initial state of its version of the mission.
     Loaded(Box<Loop>, Arc<Baseline>),
-    /// Snapshot that is not loaded yet.
-    Stored(Value),
+    Stored,
     /// The robot's last decision cannot be parsed.
     Unreadable,
 }
 
-/// Reason for refusing an event, which then changes nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Reason for refusing an event, which then changes nothing. As text, a sentence for the sender of the event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Refused {
     /// The robot is not enrolled, so it has no mission.
+    #[error(r#"the robot is not enrolled: send `{{"event": "enrol", "mission": NAME}}` first"#)]
     Unknown,
     /// The event enrols a robot that is already enrolled.
+    #[error(r#"the robot is enrolled already: send `{{"event": "retire"}}` before it gets another mission"#)]
     Enrolled,
     /// The directory of missions has no mission of this name.
+    #[error("there is no mission of that name")]
     Mission,
     /// The event requests a migration at an unknown point.
+    #[error("`at` is `action_end` or `goal`")]
     SafePoint,
     /// The message id does not begin with the robot's name and a colon.
+    #[error("the message id must be that of its robot: `ROBOT:NUMBER`")]
     Forged,
     /// The subject's partition is not the partition of the robot.
+    #[error("the robot belongs to another partition")]
     Misplaced,
     /// An event with the same message id was decided before.
+    #[error("an event with this message id was decided before")]
     Repeated,
+    /// The number of the message id lies between numbers of decided events that are so low that the numbers between them
+    /// are not stored.
+    #[error(
+        "the event is too late: so many events with higher numbers were decided before it that whether it was decided, \
+         too, is not stored"
+    )]
+    Late,
 }
 
 impl Refused {
@@ -75,46 +81,44 @@ impl Refused {
             Self::Forged => "forged_id",
             Self::Misplaced => "wrong_partition",
             Self::Repeated => "repeated_id",
-        }
-    }
-
-    /// Returns a sentence about the reason for the sender of the event.
-    pub fn sentence(self) -> &'static str {
-        match self {
-            Self::Unknown => {
-                "the robot is not enrolled: send `{\"event\": \"enrol\", \"mission\": NAME}` first"
-            }
-            Self::Enrolled => {
-                "the robot is enrolled already: send `{\"event\": \"retire\"}` before it gets another mission"
-            }
-            Self::Mission => "there is no mission of that name",
-            Self::SafePoint => "`at` is `action_end` or `goal`",
-            Self::Forged => "the message id must be that of its robot: `ROBOT:NUMBER`",
-            Self::Misplaced => "the robot belongs to another partition",
-            Self::Repeated => "an event with this message id was decided before",
+            Self::Late => "late_id",
         }
     }
 }
 
-#[derive(Clone, Copy)]
-enum Request<'a> {
-    Enrol(&'a str),
+/// Events for the fleet; all others are observations for the loop. Fields are checked when the event is decided.
+#[derive(Default, Deserialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+enum Request {
+    Enrol {
+        #[serde(default)]
+        mission: Value,
+    },
     Retire,
-    Migrate(Option<SafePoint>),
+    Migrate {
+        at: Option<Value>,
+    },
+    #[default]
+    #[serde(other)]
     Observe,
 }
 
-/// Reason why a robot cannot handle events until its mission or data are repaired.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Faulted(pub String);
+/// Reason why an event is not decided.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Undecided {
+    /// The event is refused, and has changed nothing.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// The robot cannot handle events until its mission or data are repaired.
+    #[error("{0}")]
+    Faulted(String),
+}
 
 /// Result of the first phase of a decision.
 #[derive(Debug)]
 pub enum Begun {
     /// The event is decided.
     Decided(Decided),
-    /// The event is refused and has changed nothing.
-    Refused(Refused),
     /// A search for a plan is necessary: [`Robot::search`] or [`Robot::finish`] completes the decision.
     Search(Search),
 }
@@ -131,32 +135,32 @@ pub struct Search {
 impl Robot {
     /// Restores a robot from its last decision. The loop is loaded with the first event that needs it.
     pub fn restore(last: Decided) -> Self {
-        let State { mission, digest, enrolled, migration, ids, snapshot } = last.state;
-        let control = if mission.is_some() { Control::Stored(snapshot) } else { Control::None };
-        Self { mission, event: last.event, digest, enrolled, now: last.now, ids, migration, control }
+        let control = if last.state.mission.is_some() { Control::Stored } else { Control::None };
+        Self { event: last.event, now: last.now, state: last.state, control }
     }
 
     /// Returns a robot whose last decision cannot be parsed. It can only be retired.
     pub fn unreadable() -> Self {
-        Self { mission: Some(String::new()), control: Control::Unreadable, ..Self::default() }
+        let state = State { mission: Some(String::new()), ..State::default() };
+        Self { state, control: Control::Unreadable, ..Self::default() }
+    }
+
+    /// Returns the name of the robot's mission; `None` if the robot is not enrolled.
+    pub fn mission(&self) -> Option<&str> {
+        self.state.mission.as_deref()
     }
 
     /// Decides an event: enrols the robot, retires it, changes the version of its mission, or lets its
-    /// loop handle the event. Returns a [`Refused`] if the event is refused; the state is then
-    /// unchanged.
+    /// loop handle the event.
     ///
     /// # Errors
-    /// The robot cannot continue: its mission is missing, or its snapshot does not fit the mission.
-    pub fn decide(
-        &mut self,
-        event: &Stored,
-        missions: &Missions,
-    ) -> Result<Result<Decided, Refused>, Faulted> {
-        Ok(match self.begin(event, missions)? {
+    /// The event is refused, and the state is unchanged. Or the robot cannot continue: its mission is missing, or its
+    /// snapshot does not fit the mission.
+    pub fn decide(&mut self, event: &Stored, missions: &Missions) -> Result<Decided, Undecided> {
+        match self.begin(event, missions)? {
             Begun::Decided(decided) => Ok(decided),
-            Begun::Refused(refused) => Err(refused),
-            Begun::Search(search) => Ok(self.search(search)?),
-        })
+            Begun::Search(search) => self.search(search),
+        }
     }
 
     /// Runs the first phase of [`Robot::decide`], which includes everything except searches for
@@ -164,49 +168,51 @@ impl Robot {
     ///
     /// # Errors
     /// As for [`Robot::decide`].
-    pub fn begin(&mut self, event: &Stored, missions: &Missions) -> Result<Begun, Faulted> {
-        if event.id.as_ref().is_some_and(|id| self.ids.contains(id)) {
-            return Ok(Begun::Refused(Refused::Repeated));
+    pub fn begin(&mut self, event: &Stored, missions: &Missions) -> Result<Begun, Undecided> {
+        match event.id.as_ref().map(|id| self.state.ids.membership(id)) {
+            Some(Membership::Present) => return Err(Refused::Repeated.into()),
+            Some(Membership::Unclear) => return Err(Refused::Late.into()),
+            Some(Membership::Absent) | None => {}
         }
         let text = String::from_utf8_lossy(&event.payload);
-        let head: Value = serde_json::from_str(&text).unwrap_or_default();
-        let request = request(&head);
-        let mut search = Search { decided: empty(event.sequence), answers: Vec::new(), id: event.id.clone() };
-        let name = match (request, self.mission.clone()) {
-            (Request::Enrol(name), None) => {
-                let Some(template) = missions.get(name) else {
-                    return Ok(Begun::Refused(Refused::Mission));
-                };
-                search.decided.enrolled = Some(name.to_owned());
-                self.mission = Some(name.to_owned());
-                (self.digest, self.enrolled) = (template.digest.clone(), event.time);
-                self.control =
-                    Control::Loaded(Box::new(template.control.clone()), Arc::clone(&template.baseline));
-                return Ok(self.deliberate(search));
+        let request: Request = serde_json::from_str(&text).unwrap_or_default();
+        let decided = Decided { event: event.sequence, ..Decided::default() };
+        let mut search = Search { decided, answers: Vec::new(), id: event.id.clone() };
+        if let Request::Enrol { mission } = &request {
+            if self.state.mission.is_some() {
+                return Err(Refused::Enrolled.into());
             }
-            (Request::Enrol(_), Some(_)) => return Ok(Begun::Refused(Refused::Enrolled)),
-            (_, None) => return Ok(Begun::Refused(Refused::Unknown)),
-            (_, Some(name)) => name,
-        };
-        search.decided.now = event.time.saturating_sub(self.enrolled);
+            let name = mission.as_str().unwrap_or_default();
+            let template = missions.get(name).ok_or(Refused::Mission)?;
+            search.decided.enrolled = Some(name.to_owned());
+            self.state.mission = Some(name.to_owned());
+            (self.state.digest, self.state.enrolled) = (template.digest.clone(), event.time);
+            self.control =
+                Control::Loaded(Box::new(template.control.clone()), Arc::clone(&template.baseline));
+            return Ok(self.deliberate(search));
+        }
+        let name = self.state.mission.clone().ok_or(Refused::Unknown)?;
+        search.decided.now = event.time.saturating_sub(self.state.enrolled);
         match request {
             Request::Retire => {
-                *self = Self { ids: std::mem::take(&mut self.ids), ..Self::default() };
+                let state = State { ids: std::mem::take(&mut self.state.ids), ..State::default() };
+                *self = Self { state, ..Self::default() };
                 search.decided.retired = true;
                 return Ok(Begun::Decided(self.complete(search)));
             }
-            Request::Migrate(safe_point) => {
-                let Some(at) = safe_point else { return Ok(Begun::Refused(Refused::SafePoint)) };
-                let Some(current) = missions.get(&name) else { return Ok(Begun::Refused(Refused::Mission)) };
+            Request::Migrate { at } => {
+                let at = at.map_or(Ok(SafePoint::default()), serde_json::from_value);
+                let at = at.map_err(|_| Refused::SafePoint)?;
+                let current = missions.get(&name).ok_or(Refused::Mission)?;
                 self.load(missions)?;
-                let target = Some(current.digest.clone()).filter(|target| *target != self.digest);
-                self.migration = target.map(|target| Migration { at, target });
+                let target = Some(current.digest.clone()).filter(|target| *target != self.state.digest);
+                self.state.migration = target.map(|target| Migration { at, target });
                 // If the robot does not change its version now, nothing has to be planned.
                 if !self.migrate(&name, missions, &mut search)? {
                     return Ok(Begun::Decided(self.complete(search)));
                 }
             }
-            Request::Observe | Request::Enrol(_) => {
+            Request::Observe | Request::Enrol { .. } => {
                 let now = Duration::from_micros(search.decided.now);
                 search.answers = self.load(missions)?.react(&Observation::parse(&text), now);
                 self.migrate(&name, missions, &mut search)?;
@@ -219,9 +225,9 @@ impl Robot {
     ///
     /// # Errors
     /// The loop is not loaded, because [`Robot::begin`] did not precede.
-    pub fn search(&mut self, mut search: Search) -> Result<Decided, Faulted> {
+    pub fn search(&mut self, mut search: Search) -> Result<Decided, Undecided> {
         let Control::Loaded(control, _) = &mut self.control else {
-            return Err(Faulted("the loop of the robot is not loaded".to_owned()));
+            return Err(Undecided::Faulted("the loop of the robot is not loaded".to_owned()));
         };
         search.answers.extend(control.deliberate());
         Ok(self.complete(search))
@@ -245,7 +251,7 @@ impl Robot {
         let Control::Loaded(control, _) = &mut self.control else { return None };
         let late = !control.is_answered_by(&thoughts);
         let answers = control.has_agenda().then(|| control.deliberate_with(thoughts, is_late))??;
-        let decided = Decided { now: self.now, planned: true, late, ..empty(self.event) };
+        let decided = Decided { event: self.event, now: self.now, planned: true, late, ..Decided::default() };
         Some(self.complete(Search { decided, answers, id: None }))
     }
 
@@ -254,7 +260,7 @@ impl Robot {
         match &self.control {
             Control::Loaded(control, _) => control.has_agenda(),
             // A missing field is that of a loop before its start, whose first plan is pending.
-            Control::Stored(snapshot) => snapshot.get("agenda").is_none_or(Value::is_object),
+            Control::Stored => self.state.snapshot.get("agenda").is_none_or(Value::is_object),
             Control::None | Control::Unreadable => false,
         }
     }
@@ -264,7 +270,7 @@ impl Robot {
     ///
     /// # Errors
     /// As for [`Robot::decide`].
-    pub fn thinker(&mut self, missions: &Missions) -> Result<Option<Thinker>, Faulted> {
+    pub fn thinker(&mut self, missions: &Missions) -> Result<Option<Thinker>, Undecided> {
         if !self.is_pending() {
             return Ok(None);
         }
@@ -289,8 +295,8 @@ impl Robot {
     /// Changes to another version of the mission if this was requested, the version is available, and the loop is at
     /// the requested point. Returns `true` if the robot has changed; the new loop then has to plan. If the version does
     /// not fit, an error becomes an answer, and the request is dropped.
-    fn migrate(&mut self, name: &str, missions: &Missions, search: &mut Search) -> Result<bool, Faulted> {
-        let (Some(migration), Control::Loaded(control, _)) = (&self.migration, &self.control) else {
+    fn migrate(&mut self, name: &str, missions: &Missions, search: &mut Search) -> Result<bool, Undecided> {
+        let (Some(migration), Control::Loaded(control, _)) = (&self.state.migration, &self.control) else {
             return Ok(false);
         };
         let is_safe = control.is_between_actions()
@@ -298,14 +304,14 @@ impl Robot {
         let Some(template) = missions.version(name, &migration.target).filter(|_| is_safe) else {
             return Ok(false);
         };
-        let initial = version(missions, name, &self.digest)?;
+        let initial = version(missions, name, &self.state.digest)?;
         let mut next = template.control.clone();
-        self.migration = None;
+        self.state.migration = None;
         match next.migrate(control, &initial.control) {
             Ok(answers) => {
                 search.answers.extend(answers);
                 search.decided.migrated = true;
-                self.digest.clone_from(&template.digest);
+                self.state.digest.clone_from(&template.digest);
                 self.control = Control::Loaded(Box::new(next), Arc::clone(&template.baseline));
                 Ok(true)
             }
@@ -320,7 +326,9 @@ impl Robot {
     fn complete(&mut self, search: Search) -> Decided {
         let Search { mut decided, answers, id } = search;
         (self.event, self.now) = (decided.event, decided.now);
-        self.ids.extend(id.as_deref());
+        if let Some(id) = &id {
+            self.state.ids.insert(id);
+        }
         let mut snapshot = Value::Null;
         if let Control::Loaded(control, baseline) = &mut self.control {
             decided.answers = control.decision(&answers).answers;
@@ -328,75 +336,40 @@ impl Robot {
             decided.planning |= control.has_agenda();
             snapshot = baseline.difference(control);
         }
-        decided.state = State {
-            mission: self.mission.clone(),
-            digest: self.digest.clone(),
-            enrolled: self.enrolled,
-            migration: self.migration.clone(),
-            ids: self.ids.clone(),
-            snapshot,
-        };
+        decided.state = State { snapshot, ..self.state.clone() };
         decided
     }
 
-    fn load(&mut self, missions: &Missions) -> Result<&mut Loop, Faulted> {
-        if let Control::Stored(snapshot) = &mut self.control {
-            let mission = self.mission.as_deref().unwrap_or_default();
-            let template = version(missions, mission, &self.digest)?;
+    fn load(&mut self, missions: &Missions) -> Result<&mut Loop, Undecided> {
+        if let Control::Stored = self.control {
+            let template = version(missions, self.mission().unwrap_or_default(), &self.state.digest)?;
             let mut control = template.control.clone();
-            control
-                .restore(&template.baseline.snapshot(std::mem::take(snapshot)))
-                .map_err(|message| Faulted(message.text().to_owned()))?;
+            let snapshot = std::mem::take(&mut self.state.snapshot);
+            let restored = control.restore(&template.baseline.snapshot(snapshot));
+            restored.map_err(|message| Undecided::Faulted(message.text().to_owned()))?;
             self.control = Control::Loaded(Box::new(control), Arc::clone(&template.baseline));
         }
         match &mut self.control {
             Control::Loaded(control, _) => Ok(control),
-            _ => Err(Faulted("the robot's last decision cannot be read: retire the robot".to_owned())),
+            _ => {
+                let why = "the robot's last decision cannot be read: retire the robot".to_owned();
+                Err(Undecided::Faulted(why))
+            }
         }
     }
 }
 
-fn version<'a>(missions: &'a Missions, name: &str, digest: &str) -> Result<&'a Template, Faulted> {
+fn version<'a>(missions: &'a Missions, name: &str, digest: &str) -> Result<&'a Template, Undecided> {
     missions.version(name, digest).ok_or_else(|| {
-        Faulted(format!(
+        Undecided::Faulted(format!(
             "the version {digest} of mission `{name}`, with which it was enrolled, is in no directory of missions: \
              start workers with `--former DIR` for the former files, or retire the robot"
         ))
     })
 }
 
-fn empty(event: u64) -> Decided {
-    Decided {
-        format: FORMAT.to_owned(),
-        event,
-        now: 0,
-        enrolled: None,
-        retired: false,
-        migrated: false,
-        planning: false,
-        planned: false,
-        late: false,
-        answers: Vec::new(),
-        worker: String::new(),
-        state: State::default(),
-    }
-}
-
 pub(crate) fn is_retirement(payload: &[u8]) -> bool {
     // Most events do not contain this word, so they need not be parsed.
     let has_word = payload.windows(6).any(|part| part == b"retire");
-    has_word && serde_json::from_slice(payload).is_ok_and(|head| matches!(request(&head), Request::Retire))
-}
-
-fn request(head: &Value) -> Request<'_> {
-    let text = |name: &str| head.get(name).and_then(Value::as_str);
-    match text("event") {
-        Some("enrol") => Request::Enrol(text("mission").unwrap_or_default()),
-        Some("retire") => Request::Retire,
-        Some("migrate") => Request::Migrate(match head.get("at") {
-            None => Some(SafePoint::default()),
-            Some(point) => serde_json::from_value(point.clone()).ok(),
-        }),
-        _ => Request::Observe,
-    }
+    has_word && matches!(serde_json::from_slice(payload), Ok(Request::Retire))
 }

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::ids::Membership;
 use crate::partition::{pause, persist};
-use crate::store::{Fault, Message, Receipt, Store, Stream};
+use crate::store::{Fault, Message, Store, Stream};
 use crate::wire::{Address, Decided, Presence};
 use crate::worker::owners;
 
@@ -56,7 +57,14 @@ impl<S: Store> Sender<S> {
                 id = format!("{id}:{spare}");
             }
             let message = Message { subject: &subject, id: &id, after: None, payload: event.as_bytes() };
-            let receipt = until_there(&self.store, message).await?;
+            let mut attempt = 1;
+            let receipt = loop {
+                match self.store.append(Stream::Events, message).await {
+                    Err(Fault::Unreachable(_)) => pause(attempt).await,
+                    other => break other?,
+                }
+                attempt += 1;
+            };
             if !receipt.is_known || self.is_own(&subject, receipt.sequence, &id, event).await {
                 return Ok(receipt.sequence);
             }
@@ -72,18 +80,9 @@ impl<S: Store> Sender<S> {
             return stored.subject == subject && stored.payload == event.as_bytes();
         }
         let last = persist(|| self.store.last(Stream::Decisions, subject)).await;
-        last.and_then(|last| Decided::parse(&last.payload)).is_some_and(|last| last.state.ids.contains(id))
+        last.and_then(|last| Decided::parse(&last.payload))
+            .is_some_and(|last| last.state.ids.membership(id) != Membership::Absent)
     }
-}
-
-async fn until_there<S: Store>(store: &S, message: Message<'_>) -> Result<Receipt, Fault> {
-    for attempt in 1.. {
-        match store.append(Stream::Events, message).await {
-            Err(Fault::Unreachable(_)) => pause(attempt).await,
-            other => return other,
-        }
-    }
-    Err(Fault::Conflict)
 }
 
 /// Status of a fleet, for display.

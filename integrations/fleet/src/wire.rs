@@ -8,7 +8,13 @@ use serde_json::Value;
 use crate::ids::Ids;
 
 /// Version of the data format, which every decision contains.
-pub const FORMAT: &str = "metaplan-fleet/2";
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Format {
+    /// The only version.
+    #[default]
+    #[serde(rename = "metaplan-fleet/2")]
+    V2,
+}
 
 const LONGEST_NAME: usize = 64;
 
@@ -62,24 +68,26 @@ impl fmt::Display for Address {
 
 /// Decision about an event and the state of the robot after it, as stored in the stream of decisions. The last
 /// decision about a robot is all that a worker needs to continue.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "they are independent fields of a message")]
 pub struct Decided {
-    /// Data format of the message, equal to [`FORMAT`].
-    pub format: String,
+    /// Data format of the message.
+    pub format: Format,
     /// Sequence number of the event in the stream of events.
     pub event: u64,
     /// Time between enrolment and event in microseconds.
     pub now: u64,
+    /// Answers in the format of `metaplan run`.
+    pub answers: Vec<Value>,
     /// Name of the mission, if this event has enrolled the robot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub enrolled: Option<String>,
-    /// `true` if this event has retired the robot.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub retired: bool,
     /// `true` if with this event the robot has changed to another version of its mission.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub migrated: bool,
+    /// `true` if this event has retired the robot.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub retired: bool,
     /// `true` if the decision contains only the reaction to the event, because the search for a plan takes longer,
     /// or if it is about a migration while an earlier plan is missing. The plan follows in a decision with `planned`, or
     /// in the decision about a later event.
@@ -92,8 +100,6 @@ pub struct Decided {
     /// after several searches that were cancelled.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub late: bool,
-    /// Answers in the format of `metaplan run`.
-    pub answers: Vec<Value>,
     /// Name of the worker that has decided.
     pub worker: String,
     /// State of the robot after the event: JSON, compressed with LZ4, as base64.
@@ -105,7 +111,7 @@ impl Decided {
     /// Parses a message of the stream of decisions. Returns `None` for other data or another
     /// version.
     pub fn parse(payload: &[u8]) -> Option<Self> {
-        serde_json::from_slice(payload).ok().filter(|decided: &Self| decided.format == FORMAT)
+        serde_json::from_slice(payload).ok()
     }
 }
 
@@ -204,23 +210,15 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read() {
-        let decided = Decided {
-            format: FORMAT.to_owned(),
-            event: 7,
-            now: 12,
-            enrolled: Some("ugv".to_owned()),
-            retired: false,
-            migrated: false,
-            planning: true,
-            planned: false,
-            late: false,
-            answers: vec![serde_json::json!({"answer": "plan_kept"})],
-            worker: "w".to_owned(),
-            state: State { digest: "0a1b".to_owned(), ..State::default() },
-        };
+        let state = State { digest: "0a1b".to_owned(), ..State::default() };
+        let answers = vec![serde_json::json!({"answer": "plan_kept"})];
+        let enrolled = Some("ugv".to_owned());
+        let decided =
+            Decided { event: 7, now: 12, enrolled, planning: true, answers, state, ..Decided::default() };
         let text = serde_json::to_vec(&decided).expect("plain data");
         assert_eq!(Decided::parse(&text).as_ref(), Some(&decided));
-        for wrong in [&text[..50], b"{\"format\": \"metaplan-fleet/0\"}", b"\xff"] {
+        let outdated = String::from_utf8_lossy(&text).replace("metaplan-fleet/2", "metaplan-fleet/0");
+        for wrong in [&text[..50], outdated.as_bytes(), b"\xff"] {
             assert_eq!(Decided::parse(wrong), None);
         }
     }

@@ -14,14 +14,14 @@ use std::time::{Duration, Instant};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
-use crate::partition::{Order, Shared, serve};
+use crate::partition::{Shared, serve};
 use crate::store::Store;
 use crate::wire::Presence;
 
 struct Worker<S> {
     shared: Arc<Shared<S>>,
     lease: Duration,
-    running: BTreeMap<u32, (watch::Sender<Order>, JoinHandle<()>)>,
+    running: BTreeMap<u32, (watch::Sender<bool>, JoinHandle<()>)>,
     /// Time of the last published status, and the working time of all loops in microseconds from the
     /// worker's start until then.
     looked: (Instant, u64),
@@ -68,18 +68,18 @@ impl<S: Store> Worker<S> {
             owners = self::owners(&workers, self.shared.store.partitions());
         }
         owners.retain(|_, owner| *owner == self.shared.worker);
-        for (partition, (orders, _)) in &self.running {
+        for (partition, (drain, _)) in &self.running {
             if !owners.contains_key(partition) {
-                orders.send_replace(Order::Drain);
+                drain.send_replace(true);
             }
         }
         for partition in
             owners.into_keys().filter(|partition| !self.running.contains_key(partition)).collect::<Vec<_>>()
         {
             tracing::info!(partition, "taken");
-            let (orders, receiver) = watch::channel(Order::Go);
+            let (drain, receiver) = watch::channel(false);
             let task = tokio::spawn(serve(Arc::clone(&self.shared), partition, receiver));
-            self.running.insert(partition, (orders, task));
+            self.running.insert(partition, (drain, task));
         }
     }
 

@@ -13,14 +13,14 @@
 //! Events that are decided or refused are discarded from time to time.
 
 mod own;
-mod task;
+mod runner;
 mod threads;
 
 use std::collections::BTreeMap;
 use std::future::Future;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
@@ -92,11 +92,9 @@ pub struct Shared<S> {
 #[derive(Debug, Default)]
 pub struct Counts {
     /// Number of robots in memory.
-    pub robots: AtomicU64,
+    pub robots: Arc<AtomicU64>,
     /// Number of events that are read but neither decided nor refused, without those of suspended robots.
-    pub waiting: AtomicU64,
-    /// Number of partitions that are running.
-    pub partitions: AtomicU64,
+    pub waiting: Arc<AtomicU64>,
     /// Number of events that were decided.
     pub decided: AtomicU64,
     /// Number of refused events and suspensions of robots.
@@ -122,20 +120,38 @@ impl<S> Shared<S> {
     }
 }
 
-/// Order of the worker to a running partition.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
-    /// Continue to handle events.
-    Go,
-    /// Finish running decisions, discard handled events, and end.
-    Drain,
+impl<S: Store> Shared<S> {
+    /// Counts a refused event or a suspended robot. Publishes the notice, which is a subject with a text, to the clients
+    /// of the robot.
+    fn refuse(self: &Arc<Self>, reason: &'static str, notice: Option<(&str, String)>) {
+        self.counts.refused.fetch_add(1, Ordering::Relaxed);
+        metrics::counter!("metaplan_fleet_refused_total", "reason" => reason).increment(1);
+        if let Some((subject, text)) = notice {
+            let (shared, subject) = (Arc::clone(self), subject.to_owned());
+            tokio::spawn(async move { shared.store.notice(&subject, &text).await });
+        }
+    }
+
+    fn has_too_many_robots(&self) -> bool {
+        self.counts.robots.load(Ordering::Relaxed) > self.settings.warm as u64
+    }
+
+    /// Runs work of a loop, and adds its duration to the working time.
+    fn timed<T>(&self, work: impl FnOnce() -> T) -> T {
+        let begun = Instant::now();
+        let result = work();
+        let micros = u64::try_from(begun.elapsed().as_micros()).unwrap_or(u64::MAX);
+        self.counts.busy.fetch_add(micros, Ordering::Relaxed);
+        result
+    }
 }
 
-/// Runs a partition until it is ordered to end, or until the sender of `orders` is dropped.
-pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, orders: watch::Receiver<Order>) {
-    let mut dropped = orders.clone();
+/// Runs a partition until `drain` becomes true or its sender is dropped. If it becomes true, finishes running decisions
+/// and discards handled events.
+pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, drain: watch::Receiver<bool>) {
+    let mut dropped = drain.clone();
     tokio::select! {
-        () = Partition::new(shared, partition).run(orders) => {}
+        () = Partition::new(shared, partition, drain).run() => {}
         () = async { while dropped.changed().await.is_ok() {} } => {}
     }
 }

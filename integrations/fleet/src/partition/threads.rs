@@ -13,7 +13,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio::sync::{Semaphore, SemaphorePermit, oneshot};
-use tokio::task::JoinError;
 
 /// Maximum durations of the searches of each class but the last one, which has no maximum. The second class is for
 /// short searches on a busy machine.
@@ -24,10 +23,6 @@ const CLASSES: usize = 3;
 /// Nice value of the thread of a search in each class. If threads compete, those with a higher value get less processor
 /// time.
 const NICENESS: [i32; CLASSES] = [0, 5, 15];
-
-/// A search has failed: its thread has panicked or could not be started.
-#[derive(Debug)]
-pub(crate) struct Panicked;
 
 #[derive(Debug)]
 pub(crate) struct Threads {
@@ -47,47 +42,48 @@ impl Threads {
         }
     }
 
+    /// Runs work without a search. Returns `None` if it has panicked.
     pub(crate) async fn quick<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<T, JoinError> {
+    ) -> Option<T> {
         let _permit = self.quick.acquire().await;
-        tokio::task::spawn_blocking(work).await
+        tokio::task::spawn_blocking(work).await.ok()
     }
 
     /// Runs a search. `estimate` is the expected duration, if the robot has searched before. Also
-    /// returns the [new estimate](updated).
+    /// returns the [new estimate](updated). Returns `None` if the thread has panicked or could not be started.
     pub(crate) async fn search<T: Send + 'static>(
         &self,
         mission: &str,
         estimate: Option<Duration>,
         work: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<(T, Duration), Panicked> {
+    ) -> Option<(T, Duration)> {
         let (class, permit) = self.enter(mission, estimate).await;
         let (send, mut outcome) = oneshot::channel();
         let thread = Arc::new(AtomicI32::new(0));
-        let own = Arc::clone(&thread);
+        let number = Arc::clone(&thread);
         let timed = move || {
-            own.store(thread_number(), Ordering::Relaxed);
-            set_niceness(&own, class);
+            number.store(thread_number(), Ordering::Relaxed);
+            set_niceness(&number, class);
             let begun = Instant::now();
             // The receiver is gone if the partition was given back.
             let _ = send.send((work(), begun.elapsed()));
         };
         // A thread of its own, because a thread cannot raise its priority again.
-        std::thread::Builder::new().name("search".to_owned()).spawn(timed).map_err(|_| Panicked)?;
+        std::thread::Builder::new().name("search".to_owned()).spawn(timed).ok()?;
         let limit = MAX_DURATIONS.get(class).copied().unwrap_or(Duration::MAX);
         let (result, duration) = if let Ok(done) = tokio::time::timeout(limit, &mut outcome).await {
-            done.map_err(|_| Panicked)?
+            done.ok()?
         } else {
             // Robots of this mission that have not searched yet begin in the next class.
             self.learn(mission, limit * 2);
             drop(permit);
             set_niceness(&thread, class + 1);
-            outcome.await.map_err(|_| Panicked)?
+            outcome.await.ok()?
         };
         self.learn(mission, duration);
-        Ok((result, updated(estimate.unwrap_or_default(), duration)))
+        Some((result, updated(estimate.unwrap_or_default(), duration)))
     }
 
     /// Waits for a place in the class of a search. The class may change while the search waits.

@@ -8,12 +8,12 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use futures::stream::{self, BoxStream, StreamExt as _};
+use futures::stream::{self, StreamExt as _};
 use metaplan::message::Message as Diagnostic;
 use redb::{Database, ReadableDatabase as _, ReadableTable as _, Table, TableDefinition};
 use tokio::sync::{broadcast, mpsc, oneshot, watch};
 
-use super::{Fault, Message, Receipt, Store, Stored, Stream};
+use super::{Fault, Message, Receipt, Store, Stored, Stream, Subscription, failed};
 use crate::wire::{Address, Presence};
 
 const FILE: &str = "fleet.redb";
@@ -56,10 +56,6 @@ enum Write {
     Discard { subject: String, last: u64 },
 }
 
-fn failed(error: impl std::fmt::Display) -> Fault {
-    Fault::Unreachable(error.to_string())
-}
-
 impl Local {
     /// Opens or creates a log in a directory. `partitions` applies only on creation. The last `history` decisions of
     /// each robot are kept. The status of a worker expires unless it is published again within `lease`.
@@ -85,11 +81,11 @@ impl Local {
         let (requests, mut waiting) = mpsc::unbounded_channel();
         let (writing, written) = watch::channel(0);
         let (notices, _) = broadcast::channel(1024);
-        let own = Arc::clone(&messages);
+        let written_messages = Arc::clone(&messages);
         let write_all = move || {
             let mut batch = Vec::new();
             while waiting.blocking_recv_many(&mut batch, BATCH) > 0 {
-                write(&database, &own, &mut batch);
+                write(&database, &written_messages, &mut batch);
                 writing.send_modify(|count| *count += 1);
             }
         };
@@ -194,8 +190,8 @@ impl Messages {
     ) -> Result<(), redb::Error> {
         let key = (stream, subject.to_owned());
         let Some(messages) = self.by_subject.get_mut(&key) else { return Ok(()) };
-        let kept = messages.split_off(&(last + 1));
-        let removed = std::mem::replace(messages, kept);
+        let later = messages.split_off(&(last + 1));
+        let removed = std::mem::replace(messages, later);
         if messages.is_empty() {
             self.by_subject.remove(&key);
         }
@@ -292,12 +288,7 @@ impl Store for Local {
         self.0.lease
     }
 
-    async fn follow(
-        &self,
-        stream: Stream,
-        partition: u32,
-        after: u64,
-    ) -> Result<BoxStream<'static, Result<Stored, Fault>>, Fault> {
+    async fn follow(&self, stream: Stream, partition: u32, after: u64) -> Result<Subscription, Fault> {
         let state = (self.clone(), self.0.written.clone(), after);
         let next = move |(store, mut written, after): (Self, watch::Receiver<u64>, u64)| async move {
             loop {

@@ -92,6 +92,13 @@ pub enum Fault {
     Unreachable(String),
 }
 
+fn failed(error: impl std::fmt::Display) -> Fault {
+    Fault::Unreachable(error.to_string())
+}
+
+/// Endless stream of the messages of a partition.
+pub type Subscription = BoxStream<'static, Result<Stored, Fault>>;
+
 /// The log of a fleet. Clones share the log.
 pub trait Store: Clone + Send + Sync + 'static {
     /// Returns the number of partitions, which never changes.
@@ -108,7 +115,7 @@ pub trait Store: Clone + Send + Sync + 'static {
         stream: Stream,
         partition: u32,
         after: u64,
-    ) -> impl Future<Output = Result<BoxStream<'static, Result<Stored, Fault>>, Fault>> + Send;
+    ) -> impl Future<Output = Result<Subscription, Fault>> + Send;
 
     /// Returns the sequence number of the last message of a partition that exists, or 0 for an empty
     /// partition.

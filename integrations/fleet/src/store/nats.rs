@@ -16,44 +16,57 @@ use async_nats::jetstream::consumer::{DeliverPolicy, pull};
 use async_nats::jetstream::context::{Context, PublishError, PublishErrorKind};
 use async_nats::jetstream::kv;
 use async_nats::jetstream::message::{PublishMessage, StreamMessage};
-use async_nats::jetstream::stream::{self, LastRawMessageErrorKind};
+use async_nats::jetstream::stream::{self, LastRawMessageError, LastRawMessageErrorKind};
 use async_nats::jetstream::{self};
-use async_nats::{Client, ConnectErrorKind, ConnectOptions};
+use async_nats::{Client, ConnectErrorKind, ConnectOptions, HeaderMap};
 use futures::stream::BoxStream;
 use futures::{StreamExt as _, TryStreamExt as _};
 use metaplan::message::Message as Diagnostic;
 
-use super::{Fault, Message, Receipt, Store, Stored, Stream};
+use super::{Fault, Message, Receipt, Store, Stored, Stream, Subscription, failed};
 use crate::wire::{Presence, is_name};
 
-/// Settings for the connection to NATS servers.
-#[derive(Debug, Clone, Default)]
+/// Settings for the connection to NATS servers, which are also options of the program.
+#[derive(Debug, Clone, Default, clap::Args)]
 pub struct Access {
-    /// URLs of the servers, separated by commas: `nats://HOST:PORT`, `tls://HOST:PORT`.
+    /// Connect to these servers: `nats://HOST:PORT` or `tls://HOST:PORT`, separated by commas.
+    #[arg(long = "nats", value_name = "URL", env = "NATS_URL")]
     pub url: String,
-    /// Path of a NATS credentials file with the user's JWT and seed.
+    /// Authenticate with a credentials file of NATS.
+    #[arg(long = "creds", value_name = "FILE")]
     pub credentials: Option<PathBuf>,
-    /// Name and password of the user.
-    pub user: Option<(String, String)>,
-    /// File with certificates of additional trusted authorities.
-    pub authorities: Option<PathBuf>,
-    /// Files with the client certificate and its key.
-    pub certificate: Option<(PathBuf, PathBuf)>,
+    /// Authenticate as this user, with the password in the environment variable `NATS_PASSWORD`.
+    #[arg(long, value_name = "NAME")]
+    pub user: Option<String>,
+    /// Password of the user.
+    #[arg(skip = std::env::var("NATS_PASSWORD").unwrap_or_default())]
+    pub password: String,
+    /// Trust the certificate authorities in this file in addition to those of the system.
+    #[arg(long, value_name = "FILE")]
+    pub tls_ca: Option<PathBuf>,
+    /// Authenticate with the client certificate in the first file and its key in the second file.
+    #[arg(long, value_names = ["CERTIFICATE", "KEY"], num_args = 2)]
+    pub tls_cert: Vec<PathBuf>,
 }
 
 /// Parameters with which a missing fleet is created. An existing fleet keeps its own.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, clap::Args)]
 pub struct Layout {
-    /// Name of the fleet, with which the names of its streams begin: up to 64 letters, digits, `-` and `_`.
+    /// Set the name of the fleet. Its streams, buckets and subjects begin with this name, except for subjects of the fleet `fleet`.
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_FLEET)]
     pub fleet: String,
-    /// Number of partitions, which never changes.
+    /// Set the number of partitions if the fleet is created. It cannot be changed later.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub partitions: u32,
-    /// Number of replicas: 1, 3 or 5.
+    /// Set the number of servers that store the data (1, 3 or 5) if the fleet is created.
+    #[arg(long, value_name = "N", default_value_t = 1)]
     pub replicas: usize,
-    /// Number of decisions that are kept of each robot, at least 1; -1 keeps all.
+    /// Keep this number of decisions of each robot, if the fleet is created.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(i64).range(1..))]
     pub history: i64,
-    /// Time after which the status of a worker expires.
-    pub lease: Duration,
+    /// Set the time in seconds after which a silent worker loses its partitions if the fleet is created.
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(2..=3600))]
+    pub lease: u64,
 }
 
 /// Name of the fleet whose subjects have no prefix.
@@ -79,38 +92,14 @@ pub struct Nats {
     lease: Duration,
     /// First tokens of all subjects of the fleet: empty, or `FLEET.`.
     prefix: String,
-    streams: [stream::Stream<()>; 2],
+    streams: Vec<stream::Stream>,
     workers: kv::Store,
-}
-
-fn failed(error: impl std::fmt::Display) -> Fault {
-    Fault::Unreachable(error.to_string())
-}
-
-enum OpenError {
-    /// A stream with this name exists and is not one of a fleet of this version.
-    ForeignStream(String),
-    Store(Fault),
-}
-
-impl From<Fault> for OpenError {
-    fn from(fault: Fault) -> Self {
-        Self::Store(fault)
-    }
 }
 
 /// Returns `true` if servers that have not finished starting can cause an error of this kind.
 fn is_transient(kind: ConnectErrorKind) -> bool {
-    match kind {
-        ConnectErrorKind::Dns
-        | ConnectErrorKind::TimedOut
-        | ConnectErrorKind::Io
-        | ConnectErrorKind::MaxReconnects => true,
-        ConnectErrorKind::ServerParse
-        | ConnectErrorKind::Authentication
-        | ConnectErrorKind::AuthorizationViolation
-        | ConnectErrorKind::Tls => false,
-    }
+    use ConnectErrorKind::{Dns, Io, MaxReconnects, TimedOut};
+    matches!(kind, Dns | TimedOut | Io | MaxReconnects)
 }
 
 async fn options(access: &Access) -> std::io::Result<ConnectOptions> {
@@ -121,14 +110,14 @@ async fn options(access: &Access) -> std::io::Result<ConnectOptions> {
     if let Some(file) = &access.credentials {
         options = options.credentials_file(file).await?;
     }
-    if let Some((user, password)) = access.user.clone() {
-        options = options.user_and_password(user, password);
+    if let Some(user) = access.user.clone() {
+        options = options.user_and_password(user, access.password.clone());
     }
-    if let Some(file) = access.authorities.clone() {
+    if let Some(file) = access.tls_ca.clone() {
         options = options.add_root_certificates(file);
     }
-    if let Some((certificate, key)) = access.certificate.clone() {
-        options = options.add_client_certificate(certificate, key);
+    if let [certificate, key] = access.tls_cert.as_slice() {
+        options = options.add_client_certificate(certificate.clone(), key.clone());
     }
     Ok(options)
 }
@@ -158,18 +147,14 @@ impl Nats {
         let deadline = Instant::now() + patience;
         loop {
             let failure = match async_nats::connect_with_options(urls.as_slice(), options.clone()).await {
-                Ok(client) => {
-                    let mut context = jetstream::new(client.clone());
-                    context.set_timeout(PATIENCE);
-                    match Self::with(client, context, layout).await {
-                        Ok(store) => return Ok(store),
-                        Err(OpenError::ForeignStream(name)) => {
-                            let text = format!("the stream {name} is not one of a fleet of this version");
-                            return Err(wrong(&text));
-                        }
-                        Err(OpenError::Store(fault)) => wrong(&fault),
+                Ok(client) => match Self::with(client, layout).await {
+                    Ok(Ok(store)) => return Ok(store),
+                    Ok(Err(name)) => {
+                        let text = format!("the stream {name} is not one of a fleet of this version");
+                        return Err(wrong(&text));
                     }
-                }
+                    Err(fault) => wrong(&fault),
+                },
                 Err(error) if is_transient(error.kind()) => wrong(&error),
                 Err(error) => return Err(wrong(&error)),
             };
@@ -181,58 +166,50 @@ impl Nats {
         }
     }
 
-    async fn with(client: Client, context: Context, layout: &Layout) -> Result<Self, OpenError> {
-        let prefix = subject_prefix(&layout.fleet);
-        let name = |kind| {
-            format!("{}-{}", layout.fleet, if kind == Stream::Events { "events" } else { "decisions" })
-        };
-        let config = |kind: Stream| stream::Config {
-            name: name(kind),
-            subjects: vec![format!("{prefix}{}.*.*", kind.prefix())],
-            num_replicas: layout.replicas,
-            duplicate_window: WINDOW,
-            max_messages_per_subject: if kind == Stream::Decisions { layout.history } else { -1 },
-            // The number of partitions is stored in the description, so that all clients agree on
-            // it.
-            description: Some(format!("{DESCRIPTION}{}", layout.partitions)),
-            allow_direct: true,
-            ..stream::Config::default()
-        };
-        let (mut partitions, mut prefix) = (layout.partitions, prefix.clone());
-        for kind in Stream::ALL {
-            let created = context.get_or_create_stream(config(kind)).await.map_err(failed)?;
-            let existing = &created.cached_info().config;
-            let layout_of = || {
+    /// Opens the streams and the bucket, and creates missing ones. Returns the name of an existing stream that is not one
+    /// of a fleet of this version.
+    async fn with(client: Client, layout: &Layout) -> Result<Result<Self, String>, Fault> {
+        let mut context = jetstream::new(client.clone());
+        context.set_timeout(PATIENCE);
+        let (mut partitions, mut prefix) = (layout.partitions, subject_prefix(&layout.fleet));
+        let mut streams = Vec::new();
+        for (kind, suffix) in Stream::ALL.into_iter().zip(["events", "decisions"]) {
+            let name = format!("{}-{suffix}", layout.fleet);
+            let config = stream::Config {
+                name: name.clone(),
+                subjects: vec![format!("{prefix}{}.*.*", kind.prefix())],
+                num_replicas: layout.replicas,
+                duplicate_window: WINDOW,
+                max_messages_per_subject: if kind == Stream::Decisions { layout.history } else { -1 },
+                // The number of partitions is stored in the description, so that all clients agree on
+                // it.
+                description: Some(format!("{DESCRIPTION}{partitions}")),
+                allow_direct: true,
+                ..stream::Config::default()
+            };
+            let stream = context.get_or_create_stream(config).await.map_err(failed)?;
+            let existing = &stream.cached_info().config;
+            let settings = || {
                 let partitions = existing.description.as_deref()?.strip_prefix(DESCRIPTION)?.parse().ok()?;
                 let prefix = existing.subjects.first()?.strip_suffix(&format!("{}.*.*", kind.prefix()))?;
                 Some((partitions, prefix.to_owned()))
             };
-            (partitions, prefix) = layout_of().ok_or_else(|| OpenError::ForeignStream(name(kind)))?;
+            let Some(settings) = settings() else { return Ok(Err(name)) };
+            (partitions, prefix) = settings;
+            streams.push(stream);
         }
         let bucket = format!("{}-workers", layout.fleet);
         let workers = if let Ok(store) = context.get_key_value(&bucket).await {
             store
         } else {
-            let config = kv::Config {
-                bucket: bucket.clone(),
-                num_replicas: layout.replicas,
-                max_age: layout.lease,
-                ..kv::Config::default()
-            };
-            match context.create_key_value(config).await {
-                Ok(store) => store,
-                // Another client may have created the bucket in the meantime.
-                Err(_) => context.get_key_value(&bucket).await.map_err(failed)?,
-            }
+            // This fails if another client has created the bucket in the meantime, and is then retried.
+            let (num_replicas, max_age) = (layout.replicas, Duration::from_secs(layout.lease));
+            let config = kv::Config { bucket, num_replicas, max_age, ..kv::Config::default() };
+            context.create_key_value(config).await.map_err(failed)?
         };
-        let [events, decisions] = Stream::ALL.map(name);
-        let streams = [
-            context.get_stream_no_info(events).await.map_err(failed)?,
-            context.get_stream_no_info(decisions).await.map_err(failed)?,
-        ];
         // The lease time is that of the creation of the bucket, not of `layout`.
         let lease = workers.status().await.map_err(failed)?.max_age();
-        Ok(Self { client, context, partitions, lease, prefix, streams, workers })
+        Ok(Ok(Self { client, context, partitions, lease, prefix, streams, workers }))
     }
 
     /// Returns the number of messages of a stream.
@@ -263,7 +240,7 @@ impl Nats {
         format!("{}{}.{end}", self.prefix, stream.prefix())
     }
 
-    fn stream(&self, stream: Stream) -> &stream::Stream<()> {
+    fn stream(&self, stream: Stream) -> &stream::Stream {
         &self.streams[stream as usize]
     }
 }
@@ -272,26 +249,26 @@ fn subject_prefix(fleet: &str) -> String {
     if fleet == DEFAULT_FLEET { String::new() } else { format!("{fleet}.") }
 }
 
-fn stored(message: &jetstream::Message) -> Result<Stored, Fault> {
-    let info = message.info().map_err(failed)?;
-    let time = micros(info.published.unix_timestamp_nanos());
-    let id = message.headers.as_ref().and_then(|headers| headers.get("Nats-Msg-Id"));
-    Ok(Stored {
-        sequence: info.stream_sequence,
-        subject: tail(&message.subject),
-        id: id.map(|id| id.as_str().to_owned()),
-        time,
-        payload: message.payload.to_vec(),
-    })
+fn stored(
+    sequence: u64,
+    subject: &str,
+    headers: Option<&HeaderMap>,
+    unix_nanos: i128,
+    payload: &[u8],
+) -> Stored {
+    let id = headers.and_then(|headers| headers.get("Nats-Msg-Id")).map(|id| id.as_str().to_owned());
+    let time = u64::try_from(unix_nanos / 1000).unwrap_or_default();
+    Stored { sequence, subject: tail(subject), id, time, payload: payload.to_vec() }
 }
 
-fn raw(message: &StreamMessage) -> Stored {
-    Stored {
-        sequence: message.sequence,
-        subject: tail(&message.subject),
-        id: message.headers.get("Nats-Msg-Id").map(|id| id.as_str().to_owned()),
-        time: micros(message.time.unix_timestamp_nanos()),
-        payload: message.payload.to_vec(),
+/// Converts a message that was read without a consumer; `None` if it does not exist.
+fn raw(message: Result<StreamMessage, LastRawMessageError>) -> Result<Option<Stored>, Fault> {
+    match message {
+        Ok(StreamMessage { subject, sequence, headers, payload, time }) => {
+            Ok(Some(stored(sequence, &subject, Some(&headers), time.unix_timestamp_nanos(), &payload)))
+        }
+        Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(None),
+        Err(error) => Err(failed(error)),
     }
 }
 
@@ -299,10 +276,6 @@ fn raw(message: &StreamMessage) -> Stored {
 fn tail(subject: &str) -> String {
     let start = subject.rmatch_indices('.').nth(1).map_or(0, |(dot, _)| dot + 1);
     subject[start..].to_owned()
-}
-
-fn micros(nanos: i128) -> u64 {
-    u64::try_from(nanos / 1000).unwrap_or_default()
 }
 
 fn published(error: &PublishError, bytes: usize) -> Fault {
@@ -322,12 +295,7 @@ impl Store for Nats {
         self.lease
     }
 
-    async fn follow(
-        &self,
-        kind: Stream,
-        partition: u32,
-        after: u64,
-    ) -> Result<BoxStream<'static, Result<Stored, Fault>>, Fault> {
+    async fn follow(&self, kind: Stream, partition: u32, after: u64) -> Result<Subscription, Fault> {
         let config = pull::OrderedConfig {
             filter_subject: self.subject(kind, &format!("{partition}.*")),
             deliver_policy: DeliverPolicy::ByStartSequence { start_sequence: after + 1 },
@@ -335,7 +303,13 @@ impl Store for Nats {
         };
         let consumer = self.stream(kind).create_consumer(config).await.map_err(failed)?;
         let messages = consumer.messages().await.map_err(failed)?;
-        Ok(messages.map(move |message| stored(&message.map_err(failed)?)).boxed())
+        let read = |message: Result<jetstream::Message, _>| -> Result<Stored, Fault> {
+            let message = message.map_err(failed)?;
+            let info = message.info().map_err(failed)?;
+            let (sequence, nanos) = (info.stream_sequence, info.published.unix_timestamp_nanos());
+            Ok(stored(sequence, &message.subject, message.headers.as_ref(), nanos, &message.payload))
+        };
+        Ok(messages.map(read).boxed())
     }
 
     async fn end(&self, kind: Stream, partition: u32) -> Result<u64, Fault> {
@@ -364,20 +338,11 @@ impl Store for Nats {
     }
 
     async fn last(&self, kind: Stream, subject: &str) -> Result<Option<Stored>, Fault> {
-        let name = self.subject(kind, subject);
-        match self.stream(kind).get_last_raw_message_by_subject(&name).await {
-            Ok(message) => Ok(Some(raw(&message))),
-            Err(error) if matches!(error.kind(), LastRawMessageErrorKind::NoMessageFound) => Ok(None),
-            Err(error) => Err(failed(error)),
-        }
+        raw(self.stream(kind).get_last_raw_message_by_subject(&self.subject(kind, subject)).await)
     }
 
     async fn event(&self, sequence: u64) -> Result<Option<Stored>, Fault> {
-        match self.stream(Stream::Events).get_raw_message(sequence).await {
-            Ok(message) => Ok(Some(raw(&message))),
-            Err(error) if matches!(error.kind(), LastRawMessageErrorKind::NoMessageFound) => Ok(None),
-            Err(error) => Err(failed(error)),
-        }
+        raw(self.stream(Stream::Events).get_raw_message(sequence).await)
     }
 
     async fn discard(&self, subject: &str, last: u64) -> Result<(), Fault> {

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use test_resources::{Resource, missing};
 
-use super::wires::{Wire, routes};
+use super::common::{free_port, get};
+use super::wires::Wire;
 
 const PAIRS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
@@ -46,17 +46,12 @@ struct Inner {
 
 impl Drop for Inner {
     fn drop(&mut self) {
-        for child in self.processes.lock().unwrap_or_else(std::sync::PoisonError::into_inner).values_mut() {
+        for child in self.processes.get_mut().unwrap_or_else(PoisonError::into_inner).values_mut() {
             // The process may already have ended.
             let _ = child.kill();
             let _ = child.wait();
         }
     }
-}
-
-fn free_port() -> u16 {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
-    listener.local_addr().expect("it has an address").port()
 }
 
 fn can_mount() -> bool {
@@ -108,7 +103,7 @@ impl Cluster {
     }
 
     fn processes(&self) -> MutexGuard<'_, BTreeMap<String, Child>> {
-        self.0.processes.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+        self.0.processes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -211,7 +206,7 @@ impl Cluster {
         std::thread::sleep(Duration::from_millis(millis));
         for (own, lost) in [(one, other), (other, one)] {
             // A busy server does not reply.
-            if let Some(routes) = routes(self.0.monitors[own]) {
+            if let Some((200, routes)) = get(self.0.monitors[own], "/routez") {
                 assert!(
                     !routes.contains(&format!("\"remote_name\": \"s{lost}\"")),
                     "s{own} still hears s{lost}: {routes}"

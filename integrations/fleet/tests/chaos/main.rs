@@ -10,21 +10,22 @@
 #![expect(clippy::print_stdout, reason = "what was done to whom is said while it is done")]
 
 mod cluster;
+#[path = "../local/common.rs"]
+mod common;
 #[path = "../local/scripts.rs"]
 mod scripts;
 mod wires;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use futures::StreamExt as _;
 use metaplan_fleet::robots::{Sender, status};
 use metaplan_fleet::store::nats::{Access, Layout, Nats};
-use metaplan_fleet::store::{Fault, Message, Store, Stored, Stream};
+use metaplan_fleet::store::{Message, Store as _, Stored, Stream};
 use metaplan_fleet::wire::{Address, Decided, partition_of};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use cluster::Cluster;
 
@@ -36,57 +37,78 @@ fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// Mission and events of a robot, and the expected answers to each event.
-type Script = (&'static str, Vec<String>, Vec<Vec<Value>>);
-
-/// Returns a script with the given number of events: observations of a simulated robot, then
-/// failures and recoveries of a component.
-fn script(number: usize, lines: usize) -> Script {
-    let (mission, scenario) = scripts::SCENARIOS[number % scripts::SCENARIOS.len()];
-    let (mut events, _) = scripts::play(mission, scenario, number as u64, lines);
-    let component = if mission == "ugv" { "c_kinect" } else { "c_thruster_1" };
-    let mut fails = true;
-    while events.len() < lines {
-        let status = if fails { "FALSE" } else { "OK" };
-        fails = !fails;
-        events
-            .push(json!({"event": "component_status", "component": component, "status": status}).to_string());
-    }
-    let answers = scripts::alone(mission, &events);
-    (mission, events, answers)
+fn name(robot: usize) -> String {
+    format!("robot-{robot}")
 }
 
-async fn open(cluster: &Cluster, lease: u64) -> Nats {
+fn status_event(component: &str, is_lost: bool) -> String {
+    let status = if is_lost { "FALSE" } else { "OK" };
+    json!({"event": "component_status", "component": component, "status": status}).to_string()
+}
+
+/// Mission and events of a robot.
+type Script = (&'static str, Vec<String>);
+
+/// Returns scripts with the given number of events: observations of a simulated robot, then failures and recoveries of a
+/// component.
+fn scripts(count: usize, lines: usize) -> Vec<Script> {
+    let script = |number: usize| {
+        let scenario = scripts::SCENARIOS[number % scripts::SCENARIOS.len()];
+        let mut events = scripts::play(scenario, number as u64, lines);
+        let component = if scenario.0 == "ugv" { "c_kinect" } else { "c_thruster_1" };
+        let statuses = [true, false].into_iter().cycle().map(|is_lost| status_event(component, is_lost));
+        events.extend(statuses.take(lines - events.len()));
+        (scenario.0, events)
+    };
+    (0..count.min(24)).map(script).collect()
+}
+
+/// Starts servers and workers.
+async fn begin(seed: u64, workers: usize, lease: u64) -> (Cluster, Nats) {
+    let cluster = Cluster::begin(seed);
     let access = Access { url: cluster.url(), ..Access::default() };
-    let lease = Duration::from_secs(lease);
-    let layout =
-        Layout { fleet: "fleet".to_owned(), partitions: PARTITIONS, replicas: 3, history: -1, lease };
-    match Nats::open(&access, &layout, Duration::from_secs(60)).await {
+    let fleet = "fleet".to_owned();
+    let layout = Layout { fleet, partitions: PARTITIONS, replicas: 3, history: -1, lease };
+    let store = match Nats::open(&access, &layout, Duration::from_secs(60)).await {
         Ok(store) => store,
         Err(error) => panic!("the servers do not answer: {}: {}", error.message, cluster.logs()),
+    };
+    for worker in 0..workers {
+        cluster.begin_worker(worker, PARTITIONS, lease);
     }
+    (cluster, store)
+}
+
+/// Sends the events of all robots, each after a random time of at most `pause` milliseconds. Returns the sequence
+/// numbers of the events of each robot.
+async fn send(store: &Nats, robots: usize, scripts: &[Script], pause: u64) -> BTreeMap<usize, Vec<u64>> {
+    let mut senders = tokio::task::JoinSet::new();
+    for robot in 0..robots {
+        let mut sender = Sender::new(store.clone(), &name(robot), "");
+        let events = scripts[robot % scripts.len()].1.clone();
+        senders.spawn(async move {
+            let mut sequences = Vec::new();
+            for event in &events {
+                if pause > 0 {
+                    tokio::time::sleep(Duration::from_millis(fastrand::u64(0..=pause))).await;
+                }
+                sequences.push(sender.send(event).await.expect("events are short"));
+            }
+            (robot, sequences)
+        });
+    }
+    senders.join_all().await.into_iter().collect()
 }
 
 /// Returns all decisions of a partition.
 async fn read(store: &Nats, partition: u32) -> Vec<Stored> {
     for _ in 0..60 {
-        if let Ok(messages) = try_read(store, partition).await {
+        if let Ok(messages) = common::read(store, Stream::Decisions, partition).await {
             return messages;
         }
         tokio::time::sleep(Duration::from_millis(500)).await;
     }
     panic!("partition {partition} cannot be read");
-}
-
-async fn try_read(store: &Nats, partition: u32) -> Result<Vec<Stored>, Fault> {
-    let end = store.end(Stream::Decisions, partition).await?;
-    let mut messages: Vec<Stored> = Vec::new();
-    let mut reader = store.follow(Stream::Decisions, partition, 0).await?;
-    while messages.last().map_or(0, |last| last.sequence) < end {
-        let next = tokio::time::timeout(Duration::from_secs(10), reader.next()).await;
-        messages.push(next.ok().flatten().unwrap_or(Err(Fault::Conflict))?);
-    }
-    Ok(messages)
 }
 
 /// Returns `true` for a decision that completes others with a plan.
@@ -121,12 +143,8 @@ async fn attack(store: Nats, over: Arc<AtomicBool>, seed: u64) -> u64 {
     count
 }
 
-async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
-    let cluster = Cluster::begin(seed);
-    let store = Box::pin(open(&cluster, LEASE)).await;
-    for worker in 0..WORKERS {
-        cluster.begin_worker(worker, PARTITIONS, LEASE);
-    }
+async fn schedule(seed: u64, robots: usize, lines: usize, scripts: &[Script]) {
+    let (cluster, store) = Box::pin(begin(seed, WORKERS, LEASE)).await;
     let over = Arc::new(AtomicBool::new(false));
     let begun = Instant::now();
     let trouble = {
@@ -134,29 +152,9 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
         std::thread::spawn(move || cluster.trouble(seed, &over, PARTITIONS, LEASE))
     };
     let attacker = tokio::spawn(attack(store.clone(), Arc::clone(&over), seed));
-    let sent = Arc::new(AtomicU64::new(0));
-    let mut senders = tokio::task::JoinSet::new();
-    for robot in 0..robots {
-        let mut sender = Sender::new(store.clone(), &name(robot), "");
-        let events = scripts[robot % scripts.len()].1.clone();
-        let sent = Arc::clone(&sent);
-        let pause = number("SECONDS", 20) * 2000 / events.len() as u64;
-        senders.spawn(async move {
-            let mut sequences = Vec::new();
-            for event in &events {
-                tokio::time::sleep(Duration::from_millis(fastrand::u64(0..=pause))).await;
-                sequences.push(sender.send(event).await.expect("events are short"));
-                sent.fetch_add(1, Ordering::Relaxed);
-            }
-            (robot, sequences)
-        });
-    }
-    let mut sequences = BTreeMap::new();
-    while let Some(done) = senders.join_next().await {
-        sequences.extend([done.expect("a robot says all that it has to say")]);
-    }
+    let sequences = send(&store, robots, scripts, number("SECONDS", 20) * 2000 / lines as u64).await;
+    let expected = sequences.values().map(Vec::len).sum::<usize>();
     let said = begun.elapsed();
-    let expected = sent.load(Ordering::Relaxed);
     // From here on no faults are injected, and the remaining events are decided.
     over.store(true, Ordering::Relaxed);
     let what = trouble.join().expect("trouble ends");
@@ -166,7 +164,7 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
         decided = 0;
         for partition in 0..PARTITIONS {
             let messages = read(&store, partition).await;
-            decided += messages.iter().filter(|message| !has_plan_only(message)).count() as u64;
+            decided += messages.iter().filter(|message| !has_plan_only(message)).count();
         }
         // The event of a decision that lacks its plan is not discarded.
         if decided >= expected && store.count(Stream::Events).await == Ok(0) {
@@ -180,10 +178,7 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
         begun.elapsed().as_secs_f64()
     );
     if decided < expected {
-        println!(
-            "{}",
-            serde_json::to_string(&status(&store).await.expect("it can be read")).expect("plain data")
-        );
+        println!("{:?}", status(&store).await);
     }
     assert_eq!(decided, expected, "seed {seed}: {}", cluster.logs());
     verify(&store, &sequences, scripts, seed).await;
@@ -201,31 +196,17 @@ async fn verify(store: &Nats, sequences: &BTreeMap<usize, Vec<u64>>, scripts: &[
     }
     assert_eq!(made.len(), sequences.len(), "seed {seed}");
     for (robot, sequences) in sequences {
-        let (name, (mission, events, answers)) = (name(*robot), &scripts[robot % scripts.len()]);
-        let made = &made[&name];
-        if made.iter().any(|own| own.planned) {
-            scripts::assert_replayed(mission, events, made, sequences);
-            continue;
-        }
-        let events: Vec<u64> = made.iter().map(|own| own.event).collect();
-        assert_eq!(events, *sequences, "seed {seed}: {name}: each event once, in order");
-        for (own, expected) in made.iter().zip(answers) {
-            let (own_answers, expected) = (scripts::essence(&own.answers), scripts::essence(expected));
-            assert_eq!(own_answers, expected, "seed {seed}: {name}, event {}", own.event);
-        }
+        let (name, (mission, events)) = (name(*robot), &scripts[robot % scripts.len()]);
+        let label = format!("seed {seed}, {name}");
+        scripts::assert_replayed(&label, mission, events, &made[&name], sequences);
     }
     for _ in 0..90 {
-        let count = store.count(Stream::Events).await.unwrap_or(u64::MAX);
-        if count == 0 {
+        if store.count(Stream::Events).await == Ok(0) {
             return;
         }
         tokio::time::sleep(Duration::from_secs(1)).await;
     }
     panic!("seed {seed}: {:?} events are not discarded", store.count(Stream::Events).await);
-}
-
-fn name(robot: usize) -> String {
-    format!("robot-{robot}")
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -235,11 +216,11 @@ async fn nothing_is_lost_repeated_or_out_of_order() {
         return;
     }
     let (robots, lines) = (number("ROBOTS", 1000) as usize, number("EVENTS", 100) as usize);
-    let scripts: Vec<Script> = (0..robots.min(24)).map(|own| script(own, lines)).collect();
+    let scripts = scripts(robots, lines);
     let first = number("SEED", 1);
     for seed in first..first + number("SCHEDULES", 20) {
         println!("seed {seed} begins");
-        Box::pin(schedule(seed, robots, &scripts)).await;
+        Box::pin(schedule(seed, robots, lines, &scripts)).await;
     }
 }
 
@@ -251,41 +232,30 @@ async fn figures() {
         return;
     }
     let (robots, lines) = (number("ROBOTS", 1000) as usize, number("EVENTS", 20) as usize);
-    let scripts: Vec<Script> = (0..robots.min(24)).map(|own| script(own, lines)).collect();
+    let scripts = scripts(robots, lines);
     let list = std::env::var("WORKERS").unwrap_or_else(|_| "1,2,4".to_owned());
     for workers in list.split(',').filter_map(|text| text.parse::<usize>().ok()) {
-        let cluster = Cluster::begin(0);
-        let store = Box::pin(open(&cluster, 10)).await;
-        for worker in 0..workers {
-            cluster.begin_worker(worker, PARTITIONS, 10);
-        }
+        let (cluster, store) = Box::pin(begin(0, workers, 10)).await;
         tokio::time::sleep(Duration::from_secs(15)).await;
         let begun = Instant::now();
-        let mut senders = tokio::task::JoinSet::new();
-        for robot in 0..robots {
-            let mut sender = Sender::new(store.clone(), &name(robot), "");
-            let events = scripts[robot % scripts.len()].1.clone();
-            senders.spawn(async move {
-                for event in &events {
-                    sender.send(event).await.expect("events are short");
-                }
-            });
-        }
-        senders.join_all().await;
+        send(&store, robots, &scripts, 0).await;
         let said = begun.elapsed();
         while store.count(Stream::Decisions).await.expect("it can be read") < (robots * lines) as u64 {
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
         let (decided, late) = (begun.elapsed(), calm(&store, robots.min(50)).await);
         let rate = |time: Duration| (robots * lines) as f64 / time.as_secs_f64();
+        let memory = |kind: &str, count: usize| {
+            (0..count).map(|number| cluster.memory(&format!("{kind}{number}"))).max().unwrap_or_default()
+        };
         println!(
             "{workers} workers, {robots} robots: events said at {:.0}/s, decided at {:.0}/s; one at a time median {:.1} ms, 99 percent {:.1} ms; memory {} MB each, servers {} MB",
             rate(said),
             rate(decided),
             late[late.len() / 2],
             late[late.len() * 99 / 100],
-            (0..workers).map(|own| cluster.memory(&format!("w{own}"))).max().unwrap_or_default(),
-            (0..3).map(|own| cluster.memory(&format!("s{own}"))).max().unwrap_or_default(),
+            memory("w", workers),
+            memory("s", 3),
         );
     }
 }
@@ -297,9 +267,7 @@ async fn calm(store: &Nats, robots: usize) -> Vec<f64> {
     for number in 0..200 {
         let mut sender = Sender::new(store.clone(), &name(number % robots), &format!("calm{number}."));
         let subject = sender.address().to_string();
-        let status = if (number / robots).is_multiple_of(2) { "FALSE" } else { "OK" };
-        let event =
-            json!({"event": "component_status", "component": "c_kinect", "status": status}).to_string();
+        let event = status_event("c_kinect", (number / robots).is_multiple_of(2));
         let begun = Instant::now();
         let sequence = sender.send(&event).await.expect("the event is short");
         loop {

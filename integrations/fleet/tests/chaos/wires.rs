@@ -1,10 +1,8 @@
 //! TCP connections between servers that can be cut.
 
-use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct Wire {
@@ -54,15 +52,4 @@ fn carry(mut from: TcpStream, mut to: TcpStream) {
     // Either end may be closed.
     let _ = std::io::copy(&mut from, &mut to);
     let _ = to.shutdown(Shutdown::Both);
-}
-
-/// Returns a server's status of its connections to other servers, as JSON text. `None` if the
-/// server does not reply.
-pub(super) fn routes(monitor: u16) -> Option<String> {
-    let mut stream = TcpStream::connect(("127.0.0.1", monitor)).ok()?;
-    stream.set_read_timeout(Some(Duration::from_secs(2))).ok()?;
-    stream.write_all(b"GET /routez HTTP/1.0\r\n\r\n").ok()?;
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer).ok()?;
-    answer.contains("200 OK").then_some(answer)
 }

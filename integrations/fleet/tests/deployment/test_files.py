@@ -171,7 +171,7 @@ def test_quantiles_are_those_of_the_exporter():
 
 def test_reasons_of_the_runbook_are_those_of_the_sources():
     robot = (ROOT / "integrations/fleet/src/robot.rs").read_text()
-    own = set(re.findall(r'Self::\w+ => "(\w+)",', robot)) | set(re.findall(r'self\.refuse\(.*"(\w+)"\)', SOURCES))
+    own = set(re.findall(r'Self::\w+ => "(\w+)",', robot)) | set(re.findall(r'\.refuse\(\s*"(\w+)"', SOURCES))
     section = RUNBOOK.partition("## Events are refused")[2].partition("\n## ")[0]
     assert set(re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)) - {"reason"} == own
     assert set(re.findall(r'reason!="(\w+)"', ALERTS_TEXT)) <= own

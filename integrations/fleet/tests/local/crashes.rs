@@ -6,21 +6,20 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use futures::stream::BoxStream;
-use metaplan_fleet::partition::{Order, Settings, serve};
+use metaplan_fleet::partition::Settings;
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Fault, Message, Receipt, Store, Stored, Stream};
+use metaplan_fleet::store::{Fault, Message, Receipt, Store, Stored, Stream, Subscription};
 use metaplan_fleet::wire::Presence;
-use tokio::sync::{Notify, watch};
+use tokio::sync::Notify;
 
-use super::{assert_same, decided, decisions, open, scripts, settle, shared, tell, work};
+use super::harness::{Client, Fleet, Owner, TICK, patient, shared};
 
 /// A log that stops responding after a number of operations, as if the worker had crashed. The last
 /// operation is executed without an acknowledgement if `carries_out` is set.
 #[derive(Debug, Clone)]
 struct Crashing {
     inner: Local,
-    left: Arc<AtomicU64>,
+    operations: Arc<AtomicU64>,
     carries_out: bool,
     /// `false` to omit the comparison of decisions with their required predecessors.
     fences: bool,
@@ -30,29 +29,28 @@ struct Crashing {
 }
 
 impl Crashing {
-    fn never(inner: Local, fences: bool) -> Self {
-        let left = Arc::new(AtomicU64::new(u64::MAX));
-        Self { inner, left, carries_out: false, fences, failing: Arc::default(), over: Arc::default() }
+    fn new(fleet: &Fleet, operations: u64) -> Self {
+        let (inner, operations) = (fleet.store.clone(), Arc::new(operations.into()));
+        let (carries_out, fences) = (false, true);
+        Self { inner, operations, carries_out, fences, failing: Arc::default(), over: Arc::default() }
     }
 
     /// Counts an operation, and executes it if the limit is not reached. Otherwise the returned
     /// future never completes.
     async fn through<T>(&self, operation: impl Future<Output = Result<T, Fault>>) -> Result<T, Fault> {
-        let left = self.left.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
-        match left {
-            Ok(2..) => operation.await,
-            Ok(_) if self.carries_out => {
-                let _ = operation.await;
-                self.crash().await
-            }
-            _ => self.crash().await,
+        match decrement(&self.operations) {
+            Ok(2..) => return operation.await,
+            Ok(_) if self.carries_out => drop(operation.await),
+            _ => {}
         }
-    }
-
-    async fn crash<T>(&self) -> Result<T, Fault> {
         self.over.notify_one();
         std::future::pending().await
     }
+}
+
+/// Decrements a counter and returns its former value. Fails if it is 0.
+fn decrement(counter: &AtomicU64) -> Result<u64, u64> {
+    counter.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |count| count.checked_sub(1))
 }
 
 impl Store for Crashing {
@@ -64,12 +62,7 @@ impl Store for Crashing {
         self.inner.lease()
     }
 
-    async fn follow(
-        &self,
-        stream: Stream,
-        partition: u32,
-        after: u64,
-    ) -> Result<BoxStream<'static, Result<Stored, Fault>>, Fault> {
+    async fn follow(&self, stream: Stream, partition: u32, after: u64) -> Result<Subscription, Fault> {
         self.through(self.inner.follow(stream, partition, after)).await
     }
 
@@ -85,9 +78,7 @@ impl Store for Crashing {
     }
 
     async fn discard(&self, subject: &str, last: u64) -> Result<(), Fault> {
-        let failing =
-            self.failing.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
-        if failing.is_ok() {
+        if decrement(&self.failing).is_ok() {
             return Err(Fault::Unreachable("no server".to_owned()));
         }
         self.through(self.inner.discard(subject, last)).await
@@ -116,38 +107,31 @@ impl Store for Crashing {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
-    let scripts: Vec<_> = [("ugv-a", "ugv", "kinect_at_wp2"), ("uuv-b", "uuv", "suave")]
-        .into_iter()
-        .map(|(robot, mission, scenario)| (robot, scripts::play(mission, scenario, 3, 7)))
-        .collect();
-    let count = scripts.iter().map(|(_, (events, _))| events.len()).sum();
-    let settings = Settings { discard_every: 2, look: Duration::from_millis(1), ..Settings::default() };
+    let robots = [
+        Client::play("ugv-a", ("ugv", "kinect_at_wp2"), 3, 7),
+        Client::play("uuv-b", ("uuv", "suave"), 3, 7),
+    ];
+    let count: usize = robots.iter().map(|robot| robot.events.len()).sum();
+    let settings = Settings { discard_every: 2, ..patient() };
     let mut crashes = 0;
     for carries_out in [false, true] {
         for operations in 1.. {
-            let folder = tempfile::tempdir().expect("a directory");
-            let store = open(folder.path(), 1);
-            let mut sequences = Vec::new();
-            for (robot, (events, _)) in &scripts {
-                sequences.push(tell(&store, robot, events).await);
+            let (fleet, mut robots) = (Fleet::new(1), robots.clone());
+            for robot in &mut robots {
+                robot.send_all(&fleet).await;
             }
-            let left = Arc::new(AtomicU64::new(operations));
-            let over = Arc::new(Notify::new());
-            let (inner, over_now) = (store.clone(), Arc::clone(&over));
-            let (fences, failing) = (true, Arc::default());
-            let crashing = Crashing { inner, left, carries_out, fences, failing, over: over_now };
-            let (_orders, heard) = watch::channel(Order::Go);
-            let task = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
+            let crashing = Crashing { carries_out, ..Crashing::new(&fleet, operations) };
+            let over = Arc::clone(&crashing.over);
+            let owner = Owner::start(shared(crashing, "first", settings));
             let crashed = tokio::select! {
                 () = over.notified() => true,
-                () = decided(&store, count) => false,
+                () = fleet.decided(count) => false,
             };
-            task.abort();
+            drop(owner);
             crashes += u32::from(crashed);
-            work(&store, "second", settings, count).await;
-            let made = decisions(&store).await;
-            for ((robot, (_, answers)), sequences) in scripts.iter().zip(&sequences) {
-                assert_same(robot, &made[*robot], sequences, answers);
+            fleet.work("second", settings, count).await;
+            for robot in &robots {
+                robot.verify(&fleet).await;
             }
             if !crashed {
                 break;
@@ -158,127 +142,84 @@ async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn two_owners_of_one_partition_decide_each_event_once() {
-    for seed in 0..4 {
-        let folder = tempfile::tempdir().expect("a directory");
-        let store = open(folder.path(), 1);
-        let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", seed, 30);
-        let settings = Settings { discard_every: 3, look: Duration::from_millis(1), ..Settings::default() };
-        let own = |name: &str| shared(store.clone(), name, settings);
-        let (_orders, heard) = watch::channel(Order::Go);
-        let zombie = tokio::spawn(serve(own("zombie"), 0, heard.clone()));
-        let mut sequences = tell(&store, "r", &events[..10]).await;
-        decided(&store, 3 + seed as usize).await;
-        let owner = tokio::spawn(serve(own("owner"), 0, heard));
-        for event in &events[10..] {
-            sequences.extend(tell(&store, "r", std::slice::from_ref(event)).await);
+async fn two_owners_decide_each_event_once_but_twice_without_the_comparison() {
+    for (seed, fences) in [(0, true), (1, true), (2, true), (3, true), (1, false)] {
+        let fleet = Fleet::new(1);
+        let mut robot = Client::play("r", ("ugv", "kinect_comes_and_goes"), seed, 30);
+        let settings = Settings { discard_every: if fences { 3 } else { 64 }, ..patient() };
+        let own = |name: &str| {
+            Owner::start(shared(Crashing { fences, ..Crashing::new(&fleet, u64::MAX) }, name, settings))
+        };
+        let _zombie = own("zombie");
+        if fences {
+            robot.send(&fleet, 10).await;
+            fleet.decided(3 + seed as usize).await;
+        }
+        let _owner = own("owner");
+        for number in robot.sequences.len()..robot.events.len() {
+            robot.send(&fleet, number + 1).await;
             tokio::time::sleep(Duration::from_millis(fastrand::u64(0..20))).await;
         }
-        decided(&store, events.len()).await;
-        zombie.abort();
-        owner.abort();
-        assert_same("r", &decisions(&store).await["r"], &sequences, &answers);
-    }
-}
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn without_the_comparison_events_are_decided_twice() {
-    let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", 1, 30);
-    for fences in [true, false] {
-        let folder = tempfile::tempdir().expect("a directory");
-        let store = open(folder.path(), 1);
-        let (_orders, heard) = watch::channel(Order::Go);
-        let owners = ["one", "two"].map(|name| {
-            let own = shared(Crashing::never(store.clone(), fences), name, Settings::default());
-            tokio::spawn(serve(own, 0, heard.clone()))
-        });
-        let mut sequences = Vec::new();
-        for event in &events {
-            sequences.extend(tell(&store, "r", std::slice::from_ref(event)).await);
-            tokio::time::sleep(Duration::from_millis(10)).await;
-        }
-        let mut count = events.len();
-        decided(&store, count).await;
-        // An owner that starts late knows the first decisions of the other one, and repeats only later ones.
-        while !fences && decisions(&store).await["r"].len() <= count {
-            assert!(count < 10_000, "no event is decided twice");
-            count += tell(&store, "r", &[r#"{"event": "tick"}"#.to_owned()]).await.len();
-            decided(&store, count).await;
-        }
+        let mut count = robot.events.len();
+        fleet.decided(count).await;
         if fences {
             tokio::time::sleep(Duration::from_millis(300)).await;
+            robot.verify(&fleet).await;
         }
-        owners.iter().for_each(tokio::task::JoinHandle::abort);
-        if fences {
-            assert_same("r", &decisions(&store).await["r"], &sequences, &answers);
+        // An owner that starts late loads the first decisions of the other one, and repeats only later ones.
+        while !fences && fleet.of("r").await.len() <= count {
+            assert!(count < 10_000, "no event is decided twice");
+            count += fleet.tell("r", &[TICK]).await.len();
+            fleet.decided(count).await;
         }
     }
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn owners_that_are_gone_at_any_time_leave_what_is_needed() {
-    let folder = tempfile::tempdir().expect("a directory");
-    let store = open(folder.path(), 1);
-    let scripts: Vec<_> =
-        (0..6).map(|seed| scripts::play("ugv", "kinect_comes_and_goes", seed, 30)).collect();
-    let count = scripts.iter().map(|(events, _)| events.len()).sum();
-    let mut sequences = Vec::new();
-    for (robot, (events, _)) in scripts.iter().enumerate() {
-        sequences.push(tell(&store, &format!("r{robot}"), events).await);
+    let fleet = Fleet::new(1);
+    let mut robots = Vec::new();
+    for seed in 0..6 {
+        let mut robot = Client::play(&format!("r{seed}"), ("ugv", "kinect_comes_and_goes"), seed, 30);
+        robot.send_all(&fleet).await;
+        robots.push(robot);
     }
     let mut random = fastrand::Rng::with_seed(7);
     for _ in 0..40 {
-        let discard_every = random.usize(1..12);
-        let settings = Settings { discard_every, look: Duration::from_millis(1), ..Settings::default() };
-        let (_orders, heard) = watch::channel(Order::Go);
-        let task = tokio::spawn(serve(shared(store.clone(), "gone", settings), 0, heard));
+        let _owner = fleet.own("gone", Settings { discard_every: random.usize(1..12), ..patient() });
         tokio::time::sleep(Duration::from_millis(random.u64(1..60))).await;
-        task.abort();
     }
-    work(&store, "last", Settings::default(), count).await;
-    let made = decisions(&store).await;
-    for (robot, ((_, answers), sequences)) in scripts.iter().zip(&sequences).enumerate() {
-        let robot = format!("r{robot}");
-        assert_same(&robot, &made[&robot], sequences, answers);
+    fleet.work("last", patient(), robots.iter().map(|robot| robot.events.len()).sum()).await;
+    for robot in &robots {
+        robot.verify(&fleet).await;
     }
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn events_are_discarded_after_failed_attempts() {
-    let folder = tempfile::tempdir().expect("a directory");
-    let store = open(folder.path(), 1);
-    let (events, _) = scripts::play("ugv", "kinect_at_wp2", 3, 7);
-    tell(&store, "r", &events).await;
-    let crashing = Crashing::never(store.clone(), true);
-    crashing.failing.store(5, Ordering::SeqCst);
-    let (look, discard_within) = (Duration::from_millis(1), Duration::from_millis(10));
-    let settings = Settings { look, discard_within, ..Settings::default() };
-    let (_orders, heard) = watch::channel(Order::Go);
-    let owner = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
-    settle(&store).await;
-    owner.abort();
-    assert_eq!(decisions(&store).await["r"].len(), events.len());
+    let fleet = Fleet::new(1);
+    let mut robot = Client::play("r", ("ugv", "kinect_at_wp2"), 3, 7);
+    robot.send_all(&fleet).await;
+    let crashing = Crashing { failing: Arc::new(5.into()), ..Crashing::new(&fleet, u64::MAX) };
+    let settings = Settings { discard_within: Duration::from_millis(10), ..patient() };
+    let _owner = Owner::start(shared(crashing, "first", settings));
+    fleet.settle().await;
+    robot.verify(&fleet).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_drain_does_not_wait_for_jobs_without_end() {
-    let (events, answers) = scripts::play("ugv", "kinect_at_wp2", 3, 7);
-    let settings = Settings { drain: Duration::from_millis(100), ..Settings::default() };
+    let robot = Client::play("r", ("ugv", "kinect_at_wp2"), 3, 7);
+    let settings = Settings { drain: Duration::from_millis(100), ..patient() };
     for operations in 3..9 {
-        let folder = tempfile::tempdir().expect("a directory");
-        let store = open(folder.path(), 1);
-        let sequences = tell(&store, "r", &events).await;
-        let left = Arc::new(AtomicU64::new(operations));
-        let (inner, over) = (store.clone(), Arc::<Notify>::default());
-        let (carries_out, fences, failing) = (true, true, Arc::default());
-        let crashing = Crashing { inner, left, carries_out, fences, failing, over: Arc::clone(&over) };
-        let (orders, heard) = watch::channel(Order::Go);
-        let task = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
+        let (fleet, mut robot) = (Fleet::new(1), robot.clone());
+        robot.send_all(&fleet).await;
+        let crashing = Crashing { carries_out: true, ..Crashing::new(&fleet, operations) };
+        let over = Arc::clone(&crashing.over);
+        let owner = Owner::start(shared(crashing, "first", settings));
         over.notified().await;
-        orders.send_replace(Order::Drain);
-        let end = tokio::time::timeout(Duration::from_secs(600), task).await;
-        end.expect("it ends in time").expect("no panic");
-        work(&store, "second", settings, events.len()).await;
-        assert_same("r", &decisions(&store).await["r"], &sequences, &answers);
+        owner.drain().await;
+        fleet.work("second", settings, robot.events.len()).await;
+        robot.verify(&fleet).await;
     }
 }

@@ -1,52 +1,36 @@
 //! Tests of searches for plans that take longer than the reaction to an event.
 
-use std::sync::Arc;
 use std::time::Duration;
 
-use metaplan_fleet::partition::{Order, Settings, Shared, serve};
+use metaplan_fleet::partition::Settings;
 use metaplan_fleet::robot::{Begun, Robot};
-use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Message, Store as _, Stored, Stream};
-use metaplan_fleet::wire::Address;
-use tokio::sync::watch;
 
-use super::{decisions, has_no_events, missions, open, scripts, settle, tell};
+use super::harness::{Client, Fleet, MISSIONS, RETIRE, event, patient};
+use super::scripts;
 
-/// Starts an owner of the only partition that does not wait for plans longer than `patience`.
-fn start(store: &Local, patience: u64, settings: Settings) -> tokio::task::JoinHandle<()> {
-    let settings =
-        Settings { patience: Duration::from_millis(patience), look: Duration::from_millis(1), ..settings };
-    let shared = Arc::new(Shared::new(store.clone(), missions(), "owner".to_owned(), settings));
-    tokio::spawn(async move {
-        let (_orders, heard) = watch::channel(Order::Go);
-        serve(shared, 0, heard).await;
-    })
+/// Settings with which a decision waits this number of milliseconds for its plan.
+fn hasty(millis: u64) -> Settings {
+    Settings { patience: Duration::from_millis(millis), ..patient() }
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_single_owner_handles_all_events_of_a_long_queue() {
-    let folder = tempfile::tempdir().expect("a directory");
-    let store = open(folder.path(), 1);
-    let (events, _) = scripts::play("ugv", "kinect_comes_and_goes", 5, 90);
-    let (waiting, queued) = events.split_at(60);
-    assert!(queued.len() > 20, "the queue in memory is shorter");
-    let owner = start(&store, 0, Settings { discard_every: 1, ..Settings::default() });
+    let fleet = Fleet::new(1);
+    let mut robot = Client::play("r", ("ugv", "kinect_comes_and_goes"), 5, 90);
+    assert!(robot.events.len() > 80, "the queue in memory is shorter");
+    let _owner = fleet.own("owner", Settings { discard_every: 1, ..hasty(0) });
     // Events that wait for the plans of earlier ones, and then events that do not.
-    let mut sequences = Vec::new();
-    for event in waiting {
-        sequences.extend(tell(&store, "r", std::slice::from_ref(event)).await);
-        settle(&store).await;
+    for number in 0..60 {
+        robot.send(&fleet, number + 1).await;
+        fleet.settle().await;
     }
-    sequences.extend(tell(&store, "r", queued).await);
+    robot.send_all(&fleet).await;
     // This event is refused while a plan is missing, and must be discarded, too.
-    tell(&store, "s", &events[..1]).await;
-    let subject = Address::of("s", 1).to_string();
-    let forged = Message { subject: &subject, id: "r:1", after: None, payload: b"{\"event\": \"retire\"}" };
-    store.append(Stream::Events, forged).await.expect("it is our own directory");
-    settle(&store).await;
-    owner.abort();
-    let made = &decisions(&store).await["r"];
-    let compared = scripts::assert_replayed("ugv", &events, made, &sequences);
+    fleet.tell("s", &robot.events[..1]).await;
+    fleet.append_event("0.s", "r:1", RETIRE.as_bytes()).await;
+    fleet.settle().await;
+    let made = &fleet.of("r").await;
+    let compared = scripts::assert_replayed("r", "ugv", &robot.events, made, &robot.sequences);
     assert!(compared > 2, "{compared} plans were compared");
     let is_effect = |answer: &serde_json::Value| answer.get("effect").is_some();
     assert!(
@@ -57,54 +41,49 @@ async fn a_single_owner_handles_all_events_of_a_long_queue() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() {
-    let folder = tempfile::tempdir().expect("a directory");
-    let store = open(folder.path(), 1);
-    let mut scripts = Vec::new();
-    for (number, (mission, scenario)) in scripts::SCENARIOS.into_iter().enumerate() {
-        let robot = format!("{mission}-{number}");
-        let (events, _) = scripts::play(mission, scenario, number as u64, 40);
-        scripts.push((robot.clone(), mission, tell(&store, &robot, &events).await, events));
+    let fleet = Fleet::new(1);
+    let mut robots = Vec::new();
+    for (number, scenario) in scripts::SCENARIOS.into_iter().enumerate() {
+        let mut robot = Client::play(&format!("r-{number}"), scenario, number as u64, 40);
+        robot.send_all(&fleet).await;
+        robots.push(robot);
     }
     let mut random = fastrand::Rng::with_seed(5);
     for owner in 0..100 {
-        let settings = Settings { discard_every: random.usize(1..5), warm: 3, ..Settings::default() };
-        let task = start(&store, random.u64(..3), settings);
+        let settings = Settings { discard_every: random.usize(1..5), warm: 3, ..hasty(random.u64(..3)) };
+        let _owner = fleet.own("owner", settings);
         // Later owners live longer, so that they also find plans on a slow machine.
         tokio::time::sleep(Duration::from_millis(random.u64(1..150) + owner * owner / 50)).await;
-        task.abort();
         // Events are discarded only after their plans are found.
-        if has_no_events(&store).await {
+        if fleet.has_no_events().await {
             break;
         }
     }
     // On a slow machine, a search can take longer than each of these owners lives.
-    let last = start(&store, 0, Settings::default());
-    settle(&store).await;
-    last.abort();
-    let made = decisions(&store).await;
-    for (robot, mission, sequences, events) in &scripts {
-        scripts::assert_replayed(mission, events, &made[robot], sequences);
+    let _last = fleet.own("owner", hasty(0));
+    fleet.settle().await;
+    let mut has_plans = false;
+    for robot in &robots {
+        let made = fleet.of(&robot.name).await;
+        scripts::assert_replayed(&robot.name, robot.mission, &robot.events, &made, &robot.sequences);
+        has_plans |= made.iter().any(|decision| decision.planned);
     }
     // How many plans there are, and which effects precede them, depends on the machine's speed.
-    assert!(made.values().flatten().any(|decision| decision.planned), "plans come later");
+    assert!(has_plans, "plans come later");
 }
 
 #[test]
 fn the_plan_of_an_enrolment_stays_pending_for_the_next_owner() {
-    let (missions, mut robot) = (missions(), Robot::default());
-    let event = |sequence, payload: &[u8]| {
-        let (subject, payload) = ("0.r".to_owned(), payload.to_vec());
-        Stored { sequence, subject, id: None, time: 0, payload }
-    };
-    let enrolment = event(1, br#"{"event": "enrol", "mission": "uuv"}"#);
-    let Ok(Begun::Search(search)) = robot.begin(&enrolment, &missions) else {
+    let mut robot = Robot::default();
+    let enrolment = event(1, r#"{"event": "enrol", "mission": "uuv"}"#);
+    let Ok(Begun::Search(search)) = robot.begin(&enrolment, &MISSIONS) else {
         panic!("a search is necessary")
     };
     let decided = robot.finish(search, None);
     assert!(decided.planning);
     assert!(Robot::restore(decided).is_pending());
     // A request that plans nothing leaves the plan pending.
-    let Ok(Begun::Decided(decided)) = robot.begin(&event(2, br#"{"event": "migrate"}"#), &missions) else {
+    let Ok(Begun::Decided(decided)) = robot.begin(&event(2, r#"{"event": "migrate"}"#), &MISSIONS) else {
         panic!("no search is necessary")
     };
     assert!(decided.planning);

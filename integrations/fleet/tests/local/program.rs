@@ -1,11 +1,11 @@
 //! Tests of the program: endpoints for probes and metrics, and messages on standard error.
 
 use std::fs::{self, File};
-use std::io::{Read as _, Write as _};
-use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
+
+use super::common::{free_port, get};
 
 struct Program {
     child: Child,
@@ -23,10 +23,7 @@ impl Drop for Program {
 
 impl Program {
     fn start(command: &str, more: &[&str]) -> Self {
-        let folder = tempfile::tempdir().expect("a directory");
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
-        let port = listener.local_addr().expect("it has an address").port();
-        drop(listener);
+        let (folder, port) = (tempfile::tempdir().expect("a directory"), free_port());
         let log = File::create(folder.path().join("log")).expect("it can be written");
         let missions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
         let child = Command::new(env!("CARGO_BIN_EXE_metaplan-fleet"))
@@ -40,16 +37,6 @@ impl Program {
             .spawn()
             .expect("it can be started");
         Self { child, port, folder }
-    }
-
-    fn get(&self, path: &str) -> Option<(u16, String)> {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).ok()?;
-        stream.set_read_timeout(Some(Duration::from_secs(60))).ok()?;
-        write!(stream, "GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n").ok()?;
-        let mut text = String::new();
-        stream.read_to_string(&mut text).ok()?;
-        let (head, body) = text.split_once("\r\n\r\n")?;
-        Some((head.split(' ').nth(1)?.parse().ok()?, body.to_owned()))
     }
 
     fn log(&self) -> String {
@@ -69,11 +56,7 @@ impl Program {
     }
 
     fn wait(&mut self, path: &str, status: u16) -> String {
-        self.poll(|program| program.get(path).filter(|page| page.0 == status).map(|(_, body)| body))
-    }
-
-    fn wait_for_line(&mut self, text: &str) -> String {
-        self.poll(|program| Some(program.log()).filter(|log| log.contains(text)))
+        self.poll(|program| get(program.port, path).filter(|page| page.0 == status).map(|(_, body)| body))
     }
 }
 
@@ -83,10 +66,10 @@ fn a_worker_is_ready_when_it_has_reached_its_log() {
     program.wait("/live", 200);
     program.wait("/ready", 200);
     assert!(program.wait("/metrics", 200).contains("metaplan_fleet_partitions"));
-    assert_eq!(program.get("/health").map(|page| page.0), Some(200));
-    assert_eq!(program.get("/secret").map(|page| page.0), Some(404));
+    assert_eq!(get(program.port, "/health").map(|page| page.0), Some(200));
+    assert_eq!(get(program.port, "/secret").map(|page| page.0), Some(404));
     // A worker is ready as soon as it has reached its log, and takes its partitions afterwards.
-    let log = program.wait_for_line("taken");
+    let log = program.poll(|program| Some(program.log()).filter(|log| log.contains("taken")));
     assert!(!log.contains('\u{1b}'), "{log:?}");
 }
 

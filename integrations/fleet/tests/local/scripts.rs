@@ -1,5 +1,5 @@
-//! Scripts of robots: observations of a simulated robot, and the answers that a single local loop
-//! gives to each observation.
+//! Scripts of robots: observations of a simulated robot, and the comparison of decisions with those of a single local
+//! loop.
 
 use std::path::Path;
 use std::time::Duration;
@@ -11,6 +11,7 @@ use metaplan::simulate::Strategy;
 use metaplan_fleet::wire::Decided;
 use serde_json::{Value, json};
 
+/// Names of missions and of their scenarios.
 pub(super) const SCENARIOS: [(&str, &str); 4] = [
     ("ugv", "kinect_comes_and_goes"),
     ("uuv", "battery_under_way"),
@@ -23,10 +24,9 @@ fn setup(mission: &str) -> Setup {
     Setup::read(&path).unwrap_or_else(|errors| panic!("{errors}"))
 }
 
-/// Returns at most the given number of event lines: the enrolment and the observations of a
-/// simulated robot, with their times. Also returns the answers of a separate loop to each line.
-pub(super) fn play(mission: &str, scenario: &str, seed: u64, most: usize) -> (Vec<String>, Vec<Vec<Value>>) {
-    let own = setup(mission).experiment(scenario).unwrap_or_else(|errors| panic!("{errors}"));
+/// Returns at most `most` event lines: the enrolment and the observations of a simulated robot, with their times.
+pub(super) fn play((mission, scenario): (&str, &str), seed: u64, most: usize) -> Vec<String> {
+    let experiment = setup(mission).experiment(scenario).unwrap_or_else(|errors| panic!("{errors}"));
     let mut events = vec![json!({"event": "enrol", "mission": mission}).to_string()];
     let mut is_first = true;
     let mut log = |observation: &Observation, _: &[_]| {
@@ -35,24 +35,10 @@ pub(super) fn play(mission: &str, scenario: &str, seed: u64, most: usize) -> (Ve
             events.push(observation.to_json().to_string());
         }
     };
-    own.run(Strategy::Joint, seed, &Limits::none(), &mut log).unwrap_or_else(|errors| panic!("{errors}"));
+    let outcome = experiment.run(Strategy::Joint, seed, &Limits::none(), &mut log);
+    outcome.unwrap_or_else(|errors| panic!("{errors}"));
     events.truncate(most);
-    let answers = alone(mission, &events);
-    (events, answers)
-}
-
-/// Returns the answers of a single local loop to each event line. The first line must enrol the
-/// robot.
-pub(super) fn alone(mission: &str, events: &[String]) -> Vec<Vec<Value>> {
-    let Setup { mission, settings, .. } = setup(mission);
-    let mut control = Loop::new(mission, settings).unwrap_or_else(|errors| panic!("{errors}"));
-    let start = control.start();
-    let mut answers = vec![control.decision(&start).answers];
-    for event in &events[1..] {
-        let own = control.handle(&Observation::parse(event), Duration::ZERO);
-        answers.push(control.decision(&own).answers);
-    }
-    answers
+    events
 }
 
 /// Checks that decisions are those of a single local loop that reacts to each event, and plans when a decision contains
@@ -60,13 +46,14 @@ pub(super) fn alone(mission: &str, events: &[String]) -> Vec<Vec<Value>> {
 /// plan is not compared, because it may be for the progress of an action, or for the planning problem, at its start.
 /// Returns the number of compared plans that followed in decisions of their own.
 pub(super) fn assert_replayed(
+    robot: &str,
     mission: &str,
     events: &[String],
     decided: &[Decided],
     sequences: &[u64],
 ) -> usize {
     let made: Vec<u64> = decided.iter().filter(|made| !made.planned).map(|made| made.event).collect();
-    assert_eq!(made, sequences, "each event once, in order");
+    assert_eq!(made, sequences, "{robot}: each event once, in order");
     let Setup { mission, settings, .. } = setup(mission);
     let initial = Loop::new(mission, settings).unwrap_or_else(|errors| panic!("{errors}"));
     let (baseline, mut control) = (Baseline::new(&initial), initial.clone());
@@ -87,8 +74,8 @@ pub(super) fn assert_replayed(
         let is_own = waiting == 0 || made.planning || made.planned && waiting == 1;
         if is_own {
             let expected = control.decision(&answers).answers;
-            assert_eq!(essence(&made.answers), essence(&expected), "decision {number} of {}", decided.len());
-            assert_eq!(control.has_agenda(), made.planning, "decision {number} of {}", decided.len());
+            assert_eq!(essence(&made.answers), essence(&expected), "{robot}, decision {number}");
+            assert_eq!(control.has_agenda(), made.planning, "{robot}, decision {number}");
             compared += usize::from(made.planned);
         } else {
             control = initial.clone();
@@ -97,7 +84,7 @@ pub(super) fn assert_replayed(
         }
         waiting = if made.planning { waiting + 1 } else { 0 };
     }
-    assert!(!control.has_agenda(), "the last plan is missing");
+    assert!(!control.has_agenda(), "{robot}: the last plan is missing");
     compared
 }
 
@@ -106,9 +93,9 @@ pub(super) fn essence(answers: &[Value]) -> Vec<Value> {
     let mut answers = answers.to_vec();
     for answer in &mut answers {
         for list in ["designs", "objectives"] {
-            let own = answer.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten();
-            for object in own.filter_map(Value::as_object_mut) {
-                object.remove("because");
+            let changes = answer.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten();
+            for change in changes.filter_map(Value::as_object_mut) {
+                change.remove("because");
             }
         }
     }

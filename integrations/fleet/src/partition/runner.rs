@@ -1,0 +1,500 @@
+//! A robot in memory: handles its events one after the other, each on the robot's state after its last decision, and
+//! searches for plans in the meantime. A decision is appended if the robot's last decision is still the expected one.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use futures::future::{BoxFuture, FutureExt as _};
+use metaplan::mapek::{ParallelSearch, SearchHandle, Thinker, Thoughts};
+use tokio::sync::{OwnedSemaphorePermit, mpsc, watch};
+
+use super::{Shared, pause, persist};
+use crate::missions::Missions;
+use crate::robot::{Begun, Refused, Robot, Undecided, is_retirement};
+use crate::store::{Fault, Message, Store, Stored, Stream};
+use crate::wire::{Address, Decided};
+
+/// Reason why a robot is suspended after a panic, and if the thread of a search cannot be started.
+const PANICKED: &str = "its loop has panicked";
+
+/// Increments a counter while it exists.
+pub(super) struct Count(Arc<AtomicU64>);
+
+impl Count {
+    pub(super) fn new(counter: &Arc<AtomicU64>) -> Self {
+        counter.fetch_add(1, Ordering::Relaxed);
+        Self(Arc::clone(counter))
+    }
+}
+
+impl Drop for Count {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// An event in the queue of a robot.
+pub(super) struct Queued {
+    pub(super) sequence: u64,
+    /// `None` if the queue in memory was full. The event is then read again when it is its turn.
+    pub(super) event: Option<(Stored, OwnedSemaphorePermit)>,
+    pub(super) waiting: Count,
+}
+
+/// State of a robot after its last decision, which has the sequence number `chain`; 0 without a decision.
+struct Loaded {
+    robot: Box<Robot>,
+    chain: u64,
+    /// Counts the loaded robots of the worker.
+    _count: Count,
+}
+
+enum Outcome {
+    Decided,
+    /// Nothing was decided: the event had been decided before, or there was no event.
+    Known,
+    Undecided(Undecided),
+    /// Another decision is the last one, or the planning problem has changed.
+    Outdated,
+}
+
+impl From<Undecided> for Outcome {
+    fn from(undecided: Undecided) -> Self {
+        Self::Undecided(undecided)
+    }
+}
+
+fn panicked() -> Outcome {
+    Outcome::Undecided(Undecided::Faulted(PANICKED.to_owned()))
+}
+
+/// The plans of a search and the new estimate of the duration of a search. `None` if the search has panicked or could
+/// not be started.
+type Plans = Option<(Thoughts, Duration)>;
+
+/// A search for a plan that continues after the decision.
+struct Planning {
+    search: SearchHandle,
+    plans: BoxFuture<'static, Plans>,
+}
+
+pub(super) struct Runner<S> {
+    shared: Arc<Shared<S>>,
+    pub(super) address: Address,
+    /// Subject of the robot's messages.
+    subject: String,
+    queue: mpsc::UnboundedReceiver<Queued>,
+    loaded: Option<Loaded>,
+    /// `true` if the last decision lacks a plan. Then the last event is not discarded, so that a new owner of the
+    /// partition searches for the plan.
+    is_pending: bool,
+    /// `true` if the robot was suspended while a plan was pending. Then the last event is not discarded, either.
+    is_kept: bool,
+    /// `true` if the robot cannot continue. Its events stay in the log, and only a retirement is handled.
+    is_suspended: bool,
+    /// The search that continues after the decision, and its plans.
+    search: ParallelSearch,
+    plans: Option<BoxFuture<'static, Plans>>,
+    /// Estimated duration of the robot's next search, if it has searched before.
+    estimate: Option<Duration>,
+    /// Sequence number of the last event that was decided or refused.
+    handled: u64,
+    /// Number of handled events since the last time that events of the robot were discarded, and the time of the
+    /// first of them.
+    obsolete: usize,
+    pub(super) since: Option<Instant>,
+}
+
+impl<S: Store> Runner<S> {
+    pub(super) fn new(
+        shared: Arc<Shared<S>>,
+        address: Address,
+        queue: mpsc::UnboundedReceiver<Queued>,
+    ) -> Self {
+        Self {
+            shared,
+            subject: address.to_string(),
+            address,
+            queue,
+            loaded: None,
+            is_pending: false,
+            is_kept: false,
+            is_suspended: false,
+            search: ParallelSearch::default(),
+            plans: None,
+            estimate: None,
+            handled: 0,
+            obsolete: 0,
+            since: None,
+        }
+    }
+
+    pub(super) fn has_events(&self) -> bool {
+        !self.queue.is_empty()
+    }
+
+    /// Removes the state of the robot, which its last decision contains, from memory.
+    pub(super) fn unload(&mut self) {
+        self.loaded = None;
+    }
+
+    /// Returns `true` if nothing has to be kept in memory.
+    pub(super) fn is_obsolete(&self) -> bool {
+        !self.is_suspended && self.obsolete == 0 && (self.loaded.is_none() || self.is_unknown())
+    }
+
+    fn is_unknown(&self) -> bool {
+        self.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission().is_none())
+    }
+
+    /// Works until there are no events and no plan is pending, or `drain` becomes true. Then discards handled events if
+    /// they are due.
+    pub(super) async fn run(mut self: Box<Self>, mut drain: watch::Receiver<bool>) -> Box<Self> {
+        while self.has_events() || self.is_pending || self.plans.is_some() {
+            if self.is_pending && self.plans.is_none() && !self.has_events() {
+                let outcome = self.start_planning().await;
+                self.register(None, outcome);
+                continue;
+            }
+            let Self { queue, plans, .. } = &mut *self;
+            tokio::select! {
+                biased;
+                () = drained(&mut drain) => break,
+                plans = join(plans) => self.conclude(plans).await,
+                Some(queued) = queue.recv() => self.handle(queued).await,
+            }
+            if self.obsolete >= self.shared.settings.discard_every {
+                self.discard().await;
+            }
+        }
+        let is_draining = *drain.borrow();
+        if is_draining {
+            // The next owner plans.
+            self.search.interrupt();
+            self.plans = None;
+        }
+        let within = self.shared.settings.discard_within;
+        let is_late = self.since.is_some_and(|since| since.elapsed() >= within);
+        if self.obsolete > 0 && (is_draining || is_late || self.is_unknown()) {
+            self.discard().await;
+        }
+        self
+    }
+
+    async fn handle(&mut self, Queued { sequence, event, waiting }: Queued) {
+        let is_decided = self.loaded.as_ref().is_some_and(|loaded| sequence <= loaded.robot.event);
+        let event = match event {
+            None if !is_decided => persist(|| self.shared.store.event(sequence)).await,
+            event => event.map(|(event, _)| event),
+        };
+        let outcome = match event {
+            // A suspended robot can only be retired.
+            Some(event) if self.is_suspended && !is_retirement(&event.payload) => return,
+            Some(event) => self.decide(&event).await,
+            // It is decided, and perhaps discarded.
+            None => Outcome::Known,
+        };
+        drop(waiting);
+        self.register(Some(sequence), outcome);
+    }
+
+    /// Handles an event until it is decided by this worker or another one, refused, or the robot cannot continue.
+    async fn decide(&mut self, event: &Stored) -> Outcome {
+        let id = event.id.as_ref();
+        if id.is_some_and(|id| id.split_once(':').is_none_or(|(robot, _)| robot != self.address.robot)) {
+            return Undecided::from(Refused::Forged).into();
+        }
+        for attempt in 1.. {
+            if event.sequence <= self.load().await.robot.event {
+                return Outcome::Known;
+            }
+            let begun = Instant::now();
+            let decision = self.decision(event).await;
+            metrics::histogram!("metaplan_fleet_decision_seconds").record(begun.elapsed());
+            let (outcome, planning) = match decision {
+                Ok((decided, planning)) => (self.publish(decided, Some(event.time)).await, planning),
+                Err(outcome) => (outcome, None),
+            };
+            if !matches!(outcome, Outcome::Outdated) {
+                self.follow(planning);
+                return outcome;
+            }
+            // Another worker has decided, or an unacknowledged attempt has succeeded. The robot is loaded again to find
+            // out.
+            pause(attempt).await;
+        }
+        Outcome::Known
+    }
+
+    /// Returns the decision about an event, and the search that continues if the decision lacks a plan.
+    async fn decision(&mut self, event: &Stored) -> Result<(Decided, Option<Planning>), Outcome> {
+        let (event, may_search) = (event.clone(), self.plans.is_none());
+        let begin = move |robot: &mut Robot, missions: &Missions| {
+            let begun = robot.begin(&event, missions);
+            let thinker = match &begun {
+                Ok(Begun::Search(_)) if may_search => robot.thinker(missions).ok().flatten(),
+                _ => None,
+            };
+            (begun, thinker)
+        };
+        let (begun, thinker) = self.with_robot(begin).await?;
+        let search = match begun? {
+            Begun::Decided(decided) => return Ok((decided, None)),
+            Begun::Search(search) => search,
+        };
+        let mut planning = thinker.map(|thinker| self.planning(thinker));
+        let mut thoughts = None;
+        let patience = self.shared.settings.patience;
+        if let Some(Planning { plans, .. }) = &mut planning
+            // `timeout` with zero would accept the result of a search that ends within its first millisecond.
+            && !patience.is_zero()
+            && let Ok(plans) = tokio::time::timeout(patience, plans).await
+        {
+            let (result, estimate) = plans.ok_or_else(panicked)?;
+            (thoughts, self.estimate, planning) = (Some(result), Some(estimate), None);
+        }
+        let finish = move |robot: &mut Robot, _: &Missions| robot.finish(search, thoughts);
+        Ok((self.with_robot(finish).await?, planning))
+    }
+
+    /// Starts a search if the last decision lacks a plan.
+    async fn start_planning(&mut self) -> Outcome {
+        match self.with_robot(Robot::thinker).await {
+            Ok(Ok(thinker)) => {
+                let planning = thinker.map(|thinker| self.planning(thinker));
+                self.follow(planning);
+                Outcome::Known
+            }
+            Ok(Err(undecided)) => undecided.into(),
+            Err(outcome) => outcome,
+        }
+    }
+
+    fn planning(&self, thinker: Thinker) -> Planning {
+        let (shared, estimate) = (Arc::clone(&self.shared), self.estimate);
+        let mission = self.loaded.as_ref().and_then(|loaded| loaded.robot.mission());
+        let mission = mission.unwrap_or_default().to_owned();
+        let search = thinker.handle();
+        let plans = async move {
+            let timing = Arc::clone(&shared);
+            let think = move || timing.timed(|| thinker.think());
+            shared.threads.search(&mission, estimate, think).await
+        };
+        Planning { search, plans: plans.boxed() }
+    }
+
+    fn follow(&mut self, planning: Option<Planning>) {
+        if let Some(Planning { search, plans }) = planning {
+            self.search.begin(search);
+            self.plans = Some(plans);
+        }
+    }
+
+    /// Publishes the decision that completes the last ones with the plans of the search.
+    async fn conclude(&mut self, plans: Plans) {
+        self.plans = None;
+        let is_cancelled = self.search.end();
+        let Some((thoughts, estimate)) = plans else { return self.suspend(PANICKED) };
+        if is_cancelled || self.loaded.is_none() {
+            return;
+        }
+        self.estimate = Some(estimate);
+        let is_late = self.search.accepts_late_plans();
+        let conclude = move |robot: &mut Robot, _: &Missions| robot.plan(thoughts, is_late);
+        let outcome = match self.with_robot(conclude).await {
+            Ok(Some(decided)) => self.publish(decided, None).await,
+            Ok(None) => Outcome::Outdated,
+            Err(outcome) => outcome,
+        };
+        self.register(None, outcome);
+    }
+
+    /// Returns the robot, which is loaded from its last decision if necessary.
+    async fn load(&mut self) -> &mut Loaded {
+        let loaded = if let Some(loaded) = self.loaded.take() {
+            loaded
+        } else {
+            // Plans for the problems of the former loop cannot be distinguished from those for the problems of this one.
+            self.search.update(None);
+            let last = persist(|| self.shared.store.last(Stream::Decisions, &self.subject)).await;
+            let chain = last.as_ref().map_or(0, |last| last.sequence);
+            let robot = last.map_or_else(Robot::default, |last| {
+                Decided::parse(&last.payload).map_or_else(Robot::unreadable, Robot::restore)
+            });
+            Loaded { robot: Box::new(robot), chain, _count: Count::new(&self.shared.counts.robots) }
+        };
+        self.loaded.insert(loaded)
+    }
+
+    /// Runs work without a search on the robot, on a thread for such work.
+    async fn with_robot<T: Send + 'static>(
+        &mut self,
+        work: impl FnOnce(&mut Robot, &Missions) -> T + Send + 'static,
+    ) -> Result<T, Outcome> {
+        self.load().await;
+        let (loaded, shared) = (self.loaded.take(), Arc::clone(&self.shared));
+        let work = move || {
+            let mut loaded = loaded?;
+            let result = shared.timed(|| work(&mut loaded.robot, &shared.missions));
+            Some((loaded, result))
+        };
+        let done = self.shared.threads.quick(work).await.flatten();
+        let (loaded, result) = done.ok_or_else(panicked)?;
+        self.loaded = Some(loaded);
+        Ok(result)
+    }
+
+    /// Appends a decision if the robot's last decision has the sequence number of the loaded one. Retries until the
+    /// result is known, which is [`Outcome::Outdated`] if another decision is the last one. `time` is that of the event
+    /// in microseconds since 1970, if the decision is about an event.
+    async fn publish(&mut self, mut decided: Decided, time: Option<u64>) -> Outcome {
+        let Some(Loaded { chain, .. }) = &mut self.loaded else { return Outcome::Outdated };
+        decided.worker.clone_from(&self.shared.worker);
+        let payload = serde_json::to_vec(&decided).unwrap_or_default();
+        // Without an id, so that the server compares the chain also for a repeated attempt.
+        let message = Message { subject: &self.subject, id: "", after: Some(*chain), payload: &payload };
+        let mut attempt = 1;
+        let outcome = loop {
+            match self.shared.store.append(Stream::Decisions, message).await {
+                Ok(receipt) => {
+                    if let Some(time) = time {
+                        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+                        let late = now.saturating_sub(Duration::from_micros(time));
+                        metrics::histogram!("metaplan_fleet_latency_seconds").record(late);
+                    }
+                    *chain = receipt.sequence;
+                    return Outcome::Decided;
+                }
+                Err(Fault::TooLong(length)) => {
+                    let why = format!("a decision of {length} bytes is longer than the server accepts");
+                    break Undecided::Faulted(why).into();
+                }
+                Err(Fault::Conflict) => {
+                    metrics::counter!("metaplan_fleet_fenced_total").increment(1);
+                    break Outcome::Outdated;
+                }
+                Err(Fault::Unreachable(_)) => {}
+            }
+            metrics::counter!("metaplan_fleet_retries_total").increment(1);
+            pause(attempt).await;
+            attempt += 1;
+        };
+        self.loaded = None;
+        outcome
+    }
+
+    /// Registers the outcome of an event, or, without a sequence number, of the start or the end of planning.
+    fn register(&mut self, sequence: Option<u64>, outcome: Outcome) {
+        let is_decided = matches!(outcome, Outcome::Decided);
+        // If the robot was suspended, this decision has retired it.
+        self.is_suspended &= !is_decided;
+        self.is_kept &= !is_decided;
+        let mut last = None;
+        if let Some(Loaded { robot, .. }) = &self.loaded {
+            self.is_pending = robot.is_pending();
+            self.search.update(self.is_pending.then(|| robot.question()));
+            last = is_decided.then_some(robot.event);
+        }
+        if !self.is_pending {
+            self.search.reset();
+        }
+        // The events of a suspended robot stay in the log, also those before a refused retirement.
+        let is_stuck = self.is_suspended || matches!(outcome, Outcome::Undecided(Undecided::Faulted(_)));
+        if let Some(last) = sequence.filter(|_| !is_stuck).or(last) {
+            self.handled = self.handled.max(last);
+            self.obsolete += 1;
+            self.since.get_or_insert_with(Instant::now);
+        }
+        match outcome {
+            Outcome::Known | Outcome::Outdated => {}
+            Outcome::Decided => {
+                self.shared.counts.decided.fetch_add(u64::from(sequence.is_some()), Ordering::Relaxed);
+            }
+            Outcome::Undecided(Undecided::Refused(refused)) => {
+                self.shared.refuse(refused.name(), Some((&self.subject, refused.to_string())));
+            }
+            Outcome::Undecided(Undecided::Faulted(why)) => self.suspend(&why),
+        }
+    }
+
+    fn suspend(&mut self, why: &str) {
+        self.loaded = None;
+        self.is_kept |= self.is_pending;
+        (self.is_pending, self.is_suspended) = (false, true);
+        self.search.reset();
+        metrics::counter!("metaplan_fleet_faulted_total").increment(1);
+        let Address { partition, robot } = &self.address;
+        tracing::error!(partition, robot, "robot suspended: {why}");
+        let notice = format!("the robot is suspended: {why}");
+        self.shared.refuse("faulted", Some((&self.subject, notice)));
+    }
+
+    async fn discard(&mut self) {
+        (self.obsolete, self.since) = (0, None);
+        let last = self.handled - u64::from(self.is_pending || self.is_kept);
+        if self.shared.store.discard(&self.subject, last).await.is_err() {
+            // Another attempt follows.
+            (self.obsolete, self.since) = (1, Some(Instant::now()));
+        }
+    }
+}
+
+/// Waits for the plans of a search, if there is one.
+async fn join(plans: &mut Option<BoxFuture<'static, Plans>>) -> Plans {
+    match plans {
+        Some(plans) => plans.await,
+        None => std::future::pending().await,
+    }
+}
+
+/// Waits until the partition is given back.
+async fn drained(drain: &mut watch::Receiver<bool>) {
+    if drain.wait_for(|is_draining| *is_draining).await.is_err() {
+        // The runner is dropped together with the sender.
+        std::future::pending::<()>().await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::partition::Settings;
+    use crate::store::local::Local;
+
+    #[tokio::test]
+    async fn a_search_for_the_former_loop_of_a_robot_that_is_loaded_again_is_cancelled() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = Local::open(folder.path(), 1, 8, Duration::from_secs(1))
+            .unwrap_or_else(|message| panic!("{message}"));
+        let missions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
+        let missions = Missions::read(&missions).unwrap_or_else(|errors| panic!("{errors}"));
+        let thinker = missions.get("uuv").expect("it exists").control.thinker();
+        let payload = br#"{"event": "enrol", "mission": "uuv"}"#.to_vec();
+        let event = Stored { sequence: 1, subject: "0.r".to_owned(), id: None, time: 0, payload };
+        let mut robot = Robot::default();
+        let Ok(Begun::Search(search)) = robot.begin(&event, &missions) else {
+            panic!("a search is necessary")
+        };
+        let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
+        let message = Message { subject: "0.r", id: "", after: Some(0), payload: &payload };
+        store.append(Stream::Decisions, message).await.expect("it is the first one");
+        let shared = Arc::new(Shared::new(store, missions, "w".to_owned(), Settings::default()));
+        let (_queue, queue) = mpsc::unbounded_channel();
+        let address = Address { partition: 0, robot: "r".to_owned() };
+        let mut runner = Runner::new(shared, address, queue);
+        runner.load().await;
+        for is_unloaded in [false, true] {
+            runner.search.begin(thinker.handle());
+            if is_unloaded {
+                runner.unload();
+            }
+            runner.load().await;
+            // The numbers of both problems are 0.
+            runner.register(None, Outcome::Known);
+            assert_eq!(runner.search.end(), is_unloaded);
+        }
+    }
+}
