@@ -88,7 +88,7 @@ pub fn parse<S: DeserializeOwned>(
     // `Source` decodes invalid bytes to this character, so different names would become equal.
     if let Some(offset) = text.find(char::REPLACEMENT_CHARACTER) {
         let place = Some(line_and_column(text, offset));
-        let text = "this byte is not valid UTF-8; convert the file to UTF-8";
+        let text = "this character stands for bytes that are not valid UTF-8; convert the file to UTF-8";
         return Err(Message::at("M101", name, place, text).into());
     }
     let sections = toml::from_str(text).map_err(|error| mistakes::<S>(text, error, name))?;

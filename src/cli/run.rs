@@ -82,13 +82,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let name = mission.name.clone();
     let mut control = Loop::new(mission, settings)?;
     let events = Lines::open(&arguments.events)?;
-    let mut ready = ReadyLine::new(name.clone());
     let resumed = journal(arguments, common, &mut control)?;
-    if let Some(Resumed { recovery, .. }) = &resumed {
-        ready.resume(control.beliefs(), recovery);
-    }
     let outlet = Outlet::open(&arguments.outlets, &name, painter)?;
-    ended(drive(common, control, resumed, &ready, events, &outlet), &outlet)
+    ended(drive(common, control, resumed, ReadyLine::new(name), events, &outlet), &outlet)
 }
 
 fn journal<C: Recoverable>(
@@ -103,11 +99,17 @@ fn journal<C: Recoverable>(
         Fsync::Never => Sync::Never,
     };
     let policy = Policy { sync, snapshot_every: arguments.snapshot_every };
-    let (mut journal, recovery) = Journal::open(directory, policy, control)?;
+    let (journal, recovery) = Journal::open(directory, policy, control)?;
     output::warnings(common, &recovery.warnings);
-    // The loop reacts before the line `ready` is printed, so that this line counts every event of the journal.
-    let answers = journal.begin_reacting(control).map_err(|error| unwritten(&error))?;
-    Ok(Some(Resumed { journal, recovery, answers }))
+    Ok(Some(Resumed { journal, recovery, answers: Vec::new() }))
+}
+
+/// Reacts to an event that the journal contains without a reaction. This precedes the line `ready`, so that the line
+/// counts every event of the journal. It follows the opening of all outlets, since a recorded reaction is not printed
+/// again.
+fn react<C: Recoverable>(resumed: &mut Resumed<C::Answer>, control: &mut C) -> Result<(), Message> {
+    resumed.answers = resumed.journal.begin_reacting(control).map_err(|error| unwritten(&error))?;
+    Ok(())
 }
 
 /// Closes the recording and the web page, also if the loop has failed.
@@ -122,13 +124,17 @@ fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> 
 /// when the reader of the answers closes the pipe.
 fn drive(
     common: &Common,
-    control: Loop,
-    resumed: Option<Resumed<Answer>>,
-    ready: &ReadyLine,
+    mut control: Loop,
+    mut resumed: Option<Resumed<Answer>>,
+    mut ready: ReadyLine,
     events: Lines,
     outlet: &Outlet,
 ) -> Result<(), Failure> {
-    if is_over(outlet.say(&output::line(ready)))? {
+    if let Some(resumed) = &mut resumed {
+        react(resumed, &mut control)?;
+        ready.resume(control.beliefs(), &resumed.recovery);
+    }
+    if is_over(outlet.say(&output::line(&ready)))? {
         return Ok(());
     }
     outlet.begin(&control);
@@ -149,8 +155,7 @@ fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let events = Lines::open(&arguments.events)?;
     let resumed = journal(arguments, common, &mut keeper)?;
     let outlet = Outlet::open(&arguments.outlets, "", None)?;
-    let ready = KeeperReadyLine::new(&keeper, resumed.as_ref().map(|resumed| &resumed.recovery));
-    ended(keep_going(common, keeper, resumed, &ready, events, &outlet), &outlet)
+    ended(keep_going(common, keeper, resumed, events, &outlet), &outlet)
 }
 
 fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Failure> {
@@ -160,13 +165,16 @@ fn adaptation(file: Option<&Path>, knowledge: &Knowledge) -> Result<Settings, Fa
 
 fn keep_going(
     common: &Common,
-    keeper: Keeper,
-    resumed: Option<Resumed<KeeperAnswer>>,
-    ready: &KeeperReadyLine,
+    mut keeper: Keeper,
+    mut resumed: Option<Resumed<KeeperAnswer>>,
     events: Lines,
     outlet: &Outlet,
 ) -> Result<(), Failure> {
-    if is_over(outlet.say(&output::line(ready)))? {
+    if let Some(resumed) = &mut resumed {
+        react(resumed, &mut keeper)?;
+    }
+    let ready = KeeperReadyLine::new(&keeper, resumed.as_ref().map(|resumed| &resumed.recovery));
+    if is_over(outlet.say(&output::line(&ready)))? {
         return Ok(());
     }
     let session = KeeperSession::new(common, keeper, resumed, outlet);

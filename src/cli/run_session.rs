@@ -44,11 +44,12 @@ pub(super) enum Flow {
     Over,
 }
 
-/// A journal that is open for writing, after the reaction to an event without a recorded reaction.
+/// A journal that is open for writing.
 pub(super) struct Resumed<A> {
     pub(super) journal: Journal,
     pub(super) recovery: Recovery,
-    /// Answers of that reaction, and effects that were not acknowledged.
+    /// Answers of the reaction to an event without a recorded reaction, and effects that were not acknowledged. Empty
+    /// before this reaction.
     pub(super) answers: Vec<A>,
 }
 

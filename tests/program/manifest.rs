@@ -107,6 +107,7 @@ fn a_manifest_in_another_encoding_is_refused() {
     std::fs::write(directory.path().join("m.toml"), b"# a\nname = \"caf\xe9\"\n").expect("a file");
     let outcome = metaplan_in(directory.path(), &["plan", "m.toml"], "");
     assert_eq!(outcome.status, 3, "{outcome:#?}");
-    let expected = "m.toml:2:12: error[M101]: this byte is not valid UTF-8; convert the file to UTF-8\n";
+    let expected = "m.toml:2:12: error[M101]: this character stands for bytes that are not valid UTF-8; \
+                    convert the file to UTF-8\n";
     assert_eq!(headlines(&outcome.stderr), expected);
 }

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use metaplan::mapek::{Answer, Baseline, Loop, Observation, Thinker, Thoughts};
-use serde::Deserialize;
-use serde_json::Value;
+use serde::{Deserialize, Deserializer};
+use serde_json::{Map, Value};
 
 use crate::ids::Membership;
 use crate::missions::{Missions, Template};
@@ -96,11 +96,25 @@ enum Request {
     },
     Retire,
     Migrate {
+        /// `null` is no safe point, but a missing field is the default.
+        #[serde(default, deserialize_with = "present")]
         at: Option<Value>,
     },
     #[default]
     #[serde(other)]
     Observe,
+}
+
+fn present<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Value>, D::Error> {
+    Value::deserialize(deserializer).map(Some)
+}
+
+impl Request {
+    /// Parses an event. Only JSON objects are requests: serde also reads other values as a tagged enum.
+    fn parse(text: &str) -> Self {
+        let object = serde_json::from_str::<Map<String, Value>>(text);
+        object.ok().and_then(|object| Self::deserialize(Value::Object(object)).ok()).unwrap_or_default()
+    }
 }
 
 /// Reason why an event is not decided.
@@ -175,7 +189,7 @@ impl Robot {
             Some(Membership::Absent) | None => {}
         }
         let text = String::from_utf8_lossy(&event.payload);
-        let request: Request = serde_json::from_str(&text).unwrap_or_default();
+        let request = Request::parse(&text);
         let decided = Decided { event: event.sequence, ..Decided::default() };
         let mut search = Search { decided, answers: Vec::new(), id: event.id.clone() };
         if let Request::Enrol { mission } = &request {
@@ -371,5 +385,5 @@ fn version<'a>(missions: &'a Missions, name: &str, digest: &str) -> Result<&'a T
 pub(crate) fn is_retirement(payload: &[u8]) -> bool {
     // Most events do not contain this word, so they need not be parsed.
     let has_word = payload.windows(6).any(|part| part == b"retire");
-    has_word && matches!(serde_json::from_slice(payload), Ok(Request::Retire))
+    has_word && matches!(Request::parse(&String::from_utf8_lossy(payload)), Request::Retire)
 }

@@ -157,14 +157,16 @@ impl<S: Store> Runner<S> {
                 self.register(None, outcome);
                 continue;
             }
+            let discard_at = self.since.map(|since| since + self.shared.settings.discard_within);
             let Self { queue, plans, .. } = &mut *self;
             tokio::select! {
                 biased;
                 () = drained(&mut drain) => break,
                 plans = join(plans) => self.conclude(plans).await,
+                () = until(discard_at) => {}
                 Some(queued) = queue.recv() => self.handle(queued).await,
             }
-            if self.obsolete >= self.shared.settings.discard_every {
+            if self.obsolete >= self.shared.settings.discard_every || self.is_discard_due() {
                 self.discard().await;
             }
         }
@@ -174,12 +176,15 @@ impl<S: Store> Runner<S> {
             self.search.interrupt();
             self.plans = None;
         }
-        let within = self.shared.settings.discard_within;
-        let is_late = self.since.is_some_and(|since| since.elapsed() >= within);
-        if self.obsolete > 0 && (is_draining || is_late || self.is_unknown()) {
+        if self.obsolete > 0 && (is_draining || self.is_discard_due() || self.is_unknown()) {
             self.discard().await;
         }
         self
+    }
+
+    /// Returns `true` if handled events have been in the log for [`discard_within`](super::Settings::discard_within).
+    fn is_discard_due(&self) -> bool {
+        self.since.is_some_and(|since| since.elapsed() >= self.shared.settings.discard_within)
     }
 
     async fn handle(&mut self, Queued { sequence, event, waiting }: Queued) {
@@ -201,6 +206,8 @@ impl<S: Store> Runner<S> {
 
     /// Handles an event until it is decided by this worker or another one, refused, or the robot cannot continue.
     async fn decide(&mut self, event: &Stored) -> Outcome {
+        // Also before a refusal: the robot may have a pending plan.
+        self.load().await;
         let id = event.id.as_ref();
         if id.is_some_and(|id| id.split_once(':').is_none_or(|(robot, _)| robot != self.address.robot)) {
             return Undecided::from(Refused::Forged).into();
@@ -448,6 +455,14 @@ async fn join(plans: &mut Option<BoxFuture<'static, Plans>>) -> Plans {
     }
 }
 
+/// Waits until a time; for ever if there is none.
+async fn until(time: Option<Instant>) {
+    match time {
+        Some(time) => tokio::time::sleep_until(time.into()).await,
+        None => std::future::pending().await,
+    }
+}
+
 /// Waits until the partition is given back.
 async fn drained(drain: &mut watch::Receiver<bool>) {
     if drain.wait_for(|is_draining| *is_draining).await.is_err() {
@@ -464,13 +479,49 @@ mod tests {
     use crate::partition::Settings;
     use crate::store::local::Local;
 
+    fn log(folder: &Path) -> Local {
+        Local::open(folder, 1, 8, Duration::from_secs(1)).unwrap_or_else(|message| panic!("{message}"))
+    }
+
+    fn missions() -> Missions {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
+        Missions::read(&folder).unwrap_or_else(|errors| panic!("{errors}"))
+    }
+
+    fn runner(
+        store: Local,
+        missions: Missions,
+        settings: Settings,
+    ) -> (mpsc::UnboundedSender<Queued>, Runner<Local>) {
+        let (sender, queue) = mpsc::unbounded_channel();
+        let shared = Arc::new(Shared::new(store, missions, "w".to_owned(), settings));
+        (sender, Runner::new(shared, Address { partition: 0, robot: "r".to_owned() }, queue))
+    }
+
+    #[tokio::test]
+    async fn events_are_discarded_while_a_search_runs() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = log(folder.path());
+        let message = Message { subject: "0.r", id: "", after: None, payload: br#"{"event": "tick"}"# };
+        let sequence = store.append(Stream::Events, message).await.expect("it is the first one").sequence;
+        let settings = Settings { discard_within: Duration::from_millis(10), ..Settings::default() };
+        let (sender, mut runner) = runner(store.clone(), missions(), settings);
+        runner.plans = Some(std::future::pending().boxed());
+        let waiting = Count::new(&Arc::default());
+        assert!(sender.send(Queued { sequence, event: None, waiting }).is_ok());
+        let (_drain, drain) = watch::channel(false);
+        let run = tokio::spawn(Box::new(runner).run(drain));
+        while store.end(Stream::Events, 0).await.expect("it can be read") > 0 {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+        assert!(!run.is_finished());
+        run.abort();
+    }
+
     #[tokio::test]
     async fn a_search_for_the_former_loop_of_a_robot_that_is_loaded_again_is_cancelled() {
         let folder = tempfile::tempdir().expect("a directory");
-        let store = Local::open(folder.path(), 1, 8, Duration::from_secs(1))
-            .unwrap_or_else(|message| panic!("{message}"));
-        let missions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
-        let missions = Missions::read(&missions).unwrap_or_else(|errors| panic!("{errors}"));
+        let (store, missions) = (log(folder.path()), missions());
         let thinker = missions.get("uuv").expect("it exists").control.thinker();
         let payload = br#"{"event": "enrol", "mission": "uuv"}"#.to_vec();
         let event = Stored { sequence: 1, subject: "0.r".to_owned(), id: None, time: 0, payload };
@@ -481,10 +532,7 @@ mod tests {
         let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
         let message = Message { subject: "0.r", id: "", after: Some(0), payload: &payload };
         store.append(Stream::Decisions, message).await.expect("it is the first one");
-        let shared = Arc::new(Shared::new(store, missions, "w".to_owned(), Settings::default()));
-        let (_queue, queue) = mpsc::unbounded_channel();
-        let address = Address { partition: 0, robot: "r".to_owned() };
-        let mut runner = Runner::new(shared, address, queue);
+        let (_queue, mut runner) = runner(store, missions, Settings::default());
         runner.load().await;
         for is_unloaded in [false, true] {
             runner.search.begin(thinker.handle());

@@ -184,3 +184,14 @@ fn an_event_is_decided_once_or_refused_as_late_after_a_restart() {
     assert_eq!(decide("r:4", TICK), Err(Refused::Repeated.into()));
     assert_eq!(decide("r:3", TICK), Ok(()));
 }
+
+#[test]
+fn only_objects_are_requests_for_the_fleet() {
+    let mut robot = Robot::default();
+    let mut decide = |sequence, text: &str| robot.decide(&event(sequence, text), &MISSIONS);
+    assert_eq!(decide(1, r#"["enrol", "ugv"]"#), Err(Refused::Unknown.into()));
+    assert!(decide(2, ENROL).is_ok());
+    assert!(decide(3, r#"["retire"]"#).is_ok_and(|decided| !decided.retired));
+    assert_eq!(decide(4, r#"{"event": "migrate", "at": null}"#), Err(Refused::SafePoint.into()));
+    assert!(decide(5, RETIRE).is_ok_and(|decided| decided.retired));
+}

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use metaplan_fleet::partition::Settings;
 use metaplan_fleet::robot::{Begun, Robot};
+use metaplan_fleet::store::{Message, Store as _, Stream};
 
-use super::harness::{Client, Fleet, MISSIONS, RETIRE, event, patient};
+use super::harness::{Client, ENROL, Fleet, MISSIONS, RETIRE, TICK, event, patient};
 use super::scripts;
 
 /// Settings with which a decision waits this number of milliseconds for its plan.
@@ -70,6 +71,26 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
     }
     // How many plans there are, and which effects precede them, depends on the machine's speed.
     assert!(has_plans, "plans come later");
+}
+
+/// The former owner has discarded the event that its last decision is about.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_refused_event_starts_the_search_for_a_pending_plan() {
+    let fleet = Fleet::new(1);
+    let enrolment = fleet.append_event("0.r", "", ENROL.as_bytes()).await;
+    let mut robot = Robot::default();
+    let Ok(Begun::Search(search)) = robot.begin(&event(enrolment, ENROL), &MISSIONS) else {
+        panic!("a search is necessary")
+    };
+    let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
+    fleet
+        .append(Stream::Decisions, Message { subject: "0.r", id: "", after: Some(0), payload: &payload })
+        .await;
+    fleet.store.discard("0.r", enrolment).await.expect("it is our own directory");
+    fleet.append_event("0.r", "s:1", TICK.as_bytes()).await;
+    let _owner = fleet.own("owner", Settings { discard_every: 1, ..hasty(0) });
+    fleet.settle().await;
+    assert!(fleet.of("r").await.last().is_some_and(|decided| decided.planned));
 }
 
 #[test]

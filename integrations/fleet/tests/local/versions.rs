@@ -98,9 +98,15 @@ async fn a_robot_without_its_version_waits_for_it_and_delays_nobody() {
         .map(|(name, seed)| Client::play(name, ("ugv", "kinect_comes_and_goes"), seed, 30));
     robot.send(fleet, 10).await;
     versions.work(&["old"], 10).await;
+    robot.send(fleet, 15).await;
+    let worker = Worker::start(versions.shared(&["new"]));
+    other.send(fleet, 10).await;
+    fleet.decided(20).await;
+    // These events reach a robot that is suspended already.
     robot.send(fleet, 20).await;
     other.send_all(fleet).await;
-    versions.work(&["new"], 10 + other.events.len()).await;
+    fleet.decided(10 + other.events.len()).await;
+    worker.stop().await;
     assert_eq!(versions.kept().await, robot.sequences[10..], "only events of `r` are kept");
     assert_eq!(fleet.of("r").await.len(), 10);
     // The former files are back.
