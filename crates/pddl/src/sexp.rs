@@ -216,7 +216,7 @@ impl Reader<'_, '_> {
                 .error(
                     "P106",
                     span,
-                    format!("`{text}` contains U+FFFD, which stands for bytes of another encoding"),
+                    format!("`{text}` contains bytes that are not valid in the encoding of the file"),
                 )
                 .help("convert the file to UTF-8; other encodings are accepted only in comments");
         }
