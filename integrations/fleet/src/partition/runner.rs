@@ -455,7 +455,7 @@ async fn join(plans: &mut Option<BoxFuture<'static, Plans>>) -> Plans {
     }
 }
 
-/// Waits until a time; for ever if there is none.
+/// Waits until a time, or for ever without a time.
 async fn until(time: Option<Instant>) {
     match time {
         Some(time) => tokio::time::sleep_until(time.into()).await,
