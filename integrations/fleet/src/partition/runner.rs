@@ -455,7 +455,7 @@ async fn join(plans: &mut Option<BoxFuture<'static, Plans>>) -> Plans {
     }
 }
 
-/// Waits until a time, or for ever without a time.
+/// Waits until a time. Never completes without one.
 async fn until(time: Option<Instant>) {
     match time {
         Some(time) => tokio::time::sleep_until(time.into()).await,
