@@ -363,13 +363,11 @@ impl Robot {
             restored.map_err(|message| Undecided::Faulted(message.text().to_owned()))?;
             self.control = Control::Loaded(Box::new(control), Arc::clone(&template.baseline));
         }
-        match &mut self.control {
-            Control::Loaded(control, _) => Ok(control),
-            _ => {
-                let why = "the robot's last decision cannot be read: retire the robot".to_owned();
-                Err(Undecided::Faulted(why))
-            }
-        }
+        let Control::Loaded(control, _) = &mut self.control else {
+            let why = "the robot's last decision cannot be read: retire the robot".to_owned();
+            return Err(Undecided::Faulted(why));
+        };
+        Ok(control)
     }
 }
 
