@@ -117,13 +117,13 @@ def play_all(arguments: argparse.Namespace) -> list[dict[str, object]]:
     numbered = [(name, vendor, 1 + at % 100) for at, (name, vendor) in enumerate(chosen(arguments))]
     alone = [each for each in numbered if each[0].startswith(MEASURING)]
     reports = [play(name, arguments, vendor, domain) for name, vendor, domain in alone]
+    together = [each for each in numbered if each not in alone]
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        others = [
-            pool.submit(play, name, arguments, vendor, domain)
-            for name, vendor, domain in numbered
-            if not name.startswith(MEASURING)
-        ]
-        reports += [other.result() for other in others]
+        others = [pool.submit(play, name, arguments, vendor, domain) for name, vendor, domain in together]
+        results = [other.result() for other in others]
+    # On a busy machine, robots that are played together miss their own deadlines, so a failed one is played again alone.
+    for (name, vendor, domain), report in zip(together, results, strict=True):
+        reports.append(report if report["passed"] else play(name, arguments, vendor, domain))
     return reports
 
 
