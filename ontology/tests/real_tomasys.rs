@@ -27,7 +27,8 @@ fn unavailable(engine: &Engine) -> Vec<String> {
     designs.filter(|design| !design.available).map(|design| design.individual.name).collect()
 }
 
-/// A failed component: file, component, expected spelling of the status, designs that become unavailable.
+/// A failed component gets the status in the spelling that its knowledge base allows, and the designs that need
+/// it become unavailable. Columns: file, component, expected spelling, designs that become unavailable.
 #[test]
 fn a_failure_is_spelled_as_the_knowledge_base_wants() {
     for (file, component, spelling, expected) in [

@@ -103,7 +103,10 @@ struct DisplayCause<'a> {
 impl fmt::Display for DisplayCause<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.cause {
-            Cause::Constraint(RuleIdentity { label: Some(label), .. }) => f.write_str(label),
+            // A label may contain line breaks.
+            Cause::Constraint(RuleIdentity { label: Some(label), .. }) => {
+                f.write_str(&label.replace(['\n', '\r'], " "))
+            }
             Cause::Constraint(identity) => write!(f, "{identity}"),
             Cause::IllTyped(literal) => {
                 write!(f, "the datatype of {} forbids its value", self.symbols.value(*literal))
@@ -183,5 +186,19 @@ impl fmt::Display for DisplayDerivation<'_> {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Cause, Violation};
+    use crate::rule::RuleIdentity;
+    use crate::symbol::Symbols;
+
+    #[test]
+    fn a_violation_is_one_line() {
+        let identity = RuleIdentity { label: Some("first\r\nsecond".into()), ..RuleIdentity::new("file", 0) };
+        let violation = Violation { cause: Cause::Constraint(identity), supports: Vec::new() };
+        assert_eq!(violation.display(&Symbols::default()).to_string(), "first  second");
     }
 }

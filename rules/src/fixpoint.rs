@@ -53,7 +53,8 @@ pub(crate) enum Start {
 /// deferred.
 const BLOCK_MATCHES: usize = 1 << 16;
 
-/// Maximum number of partial matches in a small block, which passes several steps of its plan at once.
+/// Maximum number of partial matches in a small block. A small block executes several steps of the rule's join
+/// plan at once, without returning to crepe between them.
 const SMALL_MATCHES: usize = 64;
 
 /// Complete matches of a plan: `bindings` contains the values of all variables, one match after the

@@ -59,7 +59,11 @@ pub enum Atom {
     },
     /// Both terms denote the same individual.
     Same(Term, Term),
-    /// The terms denote different individuals.
+    /// In a body: the terms differ for certain. Names are unique by default, so any two different names differ;
+    /// literals are compared by value. With [`Program::with_equality`](crate::Program::with_equality), the atom
+    /// matches facts of `owl:differentFrom` instead.
+    ///
+    /// In a head: concludes `owl:differentFrom`.
     Different(Term, Term),
 }
 

@@ -109,7 +109,7 @@ impl<'a> ConsideredPart<'a> {
     }
 }
 
-/// The first line of the loop of `run --configure`.
+/// The first output line of `run --configure`: the loop is ready.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct KeeperReadyLine {
     /// `ready`.

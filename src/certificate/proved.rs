@@ -126,7 +126,7 @@ impl ProvedChecker {
             Answer::Accepted(statement) if accepted => {
                 let parts = report.parts.iter().map(|part| part.part);
                 let mut parts: Vec<_> = parts.filter(|part| covered.contains(part)).collect();
-                // A front has a part for each of its points.
+                // The checks of the points of a front have the same name, which is listed once.
                 parts.dedup();
                 return Ok(Theorem::Holds { name, statement, parts });
             }

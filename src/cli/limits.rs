@@ -92,7 +92,7 @@ impl Guard {
     /// and memory.
     pub(super) fn plan(self) -> Limits {
         if self.has_read.swap(true, Ordering::Relaxed) {
-            // The other thread is reporting the time limit and will end the program.
+            // The other thread is reporting that a limit was reached and will end the program.
             loop {
                 std::thread::park();
             }

@@ -95,11 +95,14 @@ impl Roles {
             let required: BTreeSet<&str> = components.map(|component| component.name.as_str()).collect();
             if !required.contains(component.as_str()) {
                 let names: Vec<&str> = required.into_iter().collect();
-                let suggestion = did_you_mean(component, names.iter().copied());
-                let text = format!(
-                    "no design requires a component `{component}` that could be lost; designs require: {}{suggestion}",
-                    names.join(", ")
-                );
+                let remedy = if names.is_empty() {
+                    "designs require no components".to_owned()
+                } else {
+                    let suggestion = did_you_mean(component, names.iter().copied());
+                    format!("designs require: {}{suggestion}", names.join(", "))
+                };
+                let text =
+                    format!("no design requires a component `{component}` that could be lost; {remedy}");
                 mistakes.push(("loss_component", Message::error("M125", text)));
             }
         }

@@ -107,7 +107,8 @@ pub fn compare(
     planner: &mut PlanFinder<'_>,
     report: &mut Listener<'_>,
 ) -> Result<Comparison, NoResult> {
-    // The planner runs first, so that its memory can be distinguished from that of the process.
+    // The first call resets the peak memory. The planner runs before the process is built, so that its peak
+    // does not include the memory of the process.
     (config.memory)();
     let mut memo = PlanTable { planner, plans: BTreeMap::new(), costs: Costs::default() };
     let first = memo.plan(&Valuation::start(mission, config.risk))?;

@@ -105,9 +105,13 @@ impl Journal {
     /// exist. [`Journal::begin`] or [`Journal::begin_reacting`] has to be called next.
     ///
     /// # Errors
-    /// The directory cannot be used, or another process uses it; or the journal is damaged or incomplete, belongs to
-    /// another mission, or the mission leads to other decisions. Segments and snapshots are then unchanged, unless the
-    /// error occurs when they are repaired.
+    /// The directory cannot be used, or another process uses it. The journal is damaged, belongs to another
+    /// mission, or the mission leads to other decisions. An earlier write failed, and the loop continued
+    /// without the journal.
+    ///
+    /// These errors leave segments and snapshots unchanged, unless they occur during a repair. What a crash
+    /// leaves behind (an incomplete last record, missing last records) is not an error: it is repaired, or
+    /// reported in [`Recovery`].
     pub fn open<C: Recoverable>(
         directory: &Path,
         policy: Policy,

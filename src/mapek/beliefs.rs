@@ -310,7 +310,7 @@ impl Beliefs {
     /// total time if actions have durations, and otherwise the number of steps. `None` if the plan is not valid.
     pub(super) fn default_metric(&self, plan: &PlanText) -> Option<BigRational> {
         let (domain, problem) = self.remaining_mission();
-        let verdict = validate(&domain, &problem, plan, &Options::default());
+        let verdict = validate(&domain, &problem, plan, &loop_options());
         let is_timed = domain.actions.iter().any(|action| matches!(action.body, ActionBody::Durative { .. }));
         let steps = || BigRational::from_integer(plan.steps.len().into());
         verdict.valid.then(|| if is_timed { verdict.total_time } else { steps() })
@@ -326,9 +326,14 @@ impl Beliefs {
     /// or do not reach the goal. Returns `None` if they are valid.
     pub fn violation(&self) -> Option<String> {
         let (domain, problem) = self.remaining_mission();
-        let verdict = validate(&domain, &problem, &self.remaining_plan(), &Options::default());
+        let verdict = validate(&domain, &problem, &self.remaining_plan(), &loop_options());
         verdict.violation.map(|violation| self.mission.spoken(&sentence(&violation)))
     }
+}
+
+/// The loop's plans state no durations: the validator computes them from the believed situation.
+fn loop_options() -> Options {
+    Options::default().with_chosen_durations(true)
 }
 
 fn sentence(violation: &Violation) -> String {

@@ -143,7 +143,8 @@ impl PlannedStep {
             action: Name::new(&self.action),
             arguments: self.arguments.iter().map(|argument| Name::new(argument)).collect(),
             start: None,
-            // The validator computes the duration from the domain, so the planner's duration is not passed.
+            // The validator computes the duration in the believed situation, which may differ from the one
+            // planned with.
             duration: None,
             line: 0,
         }

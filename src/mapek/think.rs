@@ -1,9 +1,10 @@
 //! Planning in parallel to the loop: a copy of the loop plans on another thread while the loop reacts to observations.
 //!
-//! The copy records each planning problem (*question*) with its outcome. The loop then uses the recorded outcomes
-//! without a search, provided that no observation has changed the question in the meantime. Progress of the action
-//! under way, ticks, and repeated reports do not change the question. After such progress, however, the plan is no
-//! longer reported as optimal. Late plans can be used, too, if they fit the situation.
+//! The copy records each planning problem (*question*) with its outcome. If no observation has changed the
+//! question in the meantime, the loop uses the recorded outcomes without a search. Progress of the action under
+//! way, ticks, and repeated reports do not change the question; after such progress, however, the plan is no
+//! longer reported as optimal. Plans for a changed question are used only after several cancelled searches in a
+//! row, and only if they fit the situation.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -73,7 +74,8 @@ pub struct ParallelSearch {
     cancelled: u32,
 }
 
-/// Maximum number of consecutive cancelled searches.
+/// Number of consecutive cancelled searches after which a changed problem does not cancel the next one. A
+/// search without a current problem is always cancelled.
 const MAX_CANCELLED: u32 = 3;
 
 impl ParallelSearch {

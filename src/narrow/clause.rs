@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pddl::ast::{Condition, Derived, Name, Term, TypedName};
 
-/// Maximum number of clauses of an axiom, and of the clauses that unfolding a predicate considers.
+/// Maximum number of conjunctions in the disjunctive normal form of an axiom, and of the clauses that unfolding
+/// a predicate considers.
 pub(super) const MAX_CLAUSES: usize = 1000;
 
 pub(super) type Fact = (Name, Vec<Name>);
@@ -128,6 +129,9 @@ fn disjuncts(condition: &Condition, variables: &mut BTreeSet<Name>) -> Option<Ve
             for part in parts {
                 let mut names = outer.clone();
                 conjunctions.extend(disjuncts(part, &mut names)?);
+                if conjunctions.len() > MAX_CLAUSES {
+                    return None;
+                }
                 variables.extend(names);
             }
             Some(conjunctions)

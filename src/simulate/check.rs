@@ -10,7 +10,8 @@ use crate::mission::{Mission, Mistake, setting};
 
 /// Maximum of times, so that a clock in microseconds can hold them in each time unit.
 const MAX_TIME: f64 = 1e9;
-/// Maximum number of random failures of a component in a mission.
+/// Maximum of the expected number of random failures of a component in a mission: the time budget, divided by
+/// the mean time between failures.
 const MAX_FAILURES: f64 = 1e6;
 
 #[derive(Debug, Clone, Default)]

@@ -465,6 +465,22 @@ fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
     Ok((0..count).map(|number| json!(pairs[number * pairs.len() / count])).collect())
 }
 
+/// Returns a word of the command with all values of its placeholders. Files in the directory of a run are not files
+/// of the study.
+fn instances(word: &str, keys: &[(String, Vec<Value>)]) -> Vec<String> {
+    let mut words = vec![word.to_owned()];
+    for (key, values) in keys {
+        let placeholder = format!("{{{key}}}");
+        if word.contains(&placeholder) {
+            let filled = |word: &String| {
+                values.iter().map(|value| word.replace(&placeholder, &shown(value))).collect()
+            };
+            words = words.iter().flat_map(|word| -> Vec<String> { filled(word) }).collect();
+        }
+    }
+    words
+}
+
 fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) -> String {
     let mut hash = Sha256::new();
     let mut part = |bytes: &[u8]| {
@@ -476,7 +492,7 @@ fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) 
     part(env!("CARGO_PKG_VERSION").as_bytes());
     part(format!("{:?} {:?} {:?}", sections.command, sections.time_limit, sections.generate).as_bytes());
     part(json!(keys).to_string().as_bytes());
-    for word in &sections.command {
+    for word in sections.command.iter().flat_map(|word| instances(word, keys)) {
         let path = directory.join(word);
         let Ok(bytes) = std::fs::read(&path) else { continue };
         part(&bytes);
@@ -502,6 +518,25 @@ mod tests {
 
     const TEXT: &str = "command = ['plan', 'm-{n}.toml']\n\
         [vary]\nfail = [[], ['a', 'b']]\nn = {from = 1, to = 5, step = 2}\nstay-close = [true, false]\nset = ['x=1']\n";
+
+    #[test]
+    fn files_with_placeholders_belong_to_the_digest() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let write = |name: &str, text: &str| {
+            std::fs::write(folder.path().join(name), text).expect("it can be written")
+        };
+        let digest = || Study::read(&folder.path().join("study.toml")).expect("a study").digest;
+        write("study.toml", TEXT);
+        let without = digest();
+        write("m-3.toml", "a");
+        let with = digest();
+        write("m-3.toml", "b");
+        assert!(without != with && with != digest());
+        write("m-3.toml", "a");
+        // No run uses this file.
+        write("m-2.toml", "a");
+        assert_eq!(with, digest());
+    }
 
     #[test]
     fn runs_are_the_product_and_shards_divide_it() {

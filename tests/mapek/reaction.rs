@@ -230,6 +230,42 @@ fn effects_are_those_in_the_state_before_the_action() {
     }
 }
 
+/// The planner chooses a duration that no equality determines, and the loop judges its plans by the same choice.
+#[test]
+fn variable_durations_are_those_of_the_planner() {
+    for (constraint, metric, expected) in [
+        ("(>= ?duration 3)", "", "3"),
+        ("(and (>= ?duration (least)) (<= ?duration 9))", "(:metric minimize (total-time))", "4"),
+        ("(and (>= ?duration 3) (<= ?duration (most)))", "(:metric maximize (total-time))", "7"),
+    ] {
+        let domain = format!(
+            "(define (domain d) (:requirements :strips :fluents :durative-actions :duration-inequalities)
+              (:predicates (half) (done)) (:functions (least) (most))
+              (:durative-action go :parameters () :duration {constraint}
+                :condition (at start (not (half))) :effect (at end (half)))
+              (:durative-action return :parameters () :duration (= ?duration 1)
+                :condition (at start (half)) :effect (at end (done))))"
+        );
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init (= (least) 4) (= (most) 7)) (:goal (done)) {metric})"
+        );
+        let mut control = own(&domain, &problem, "");
+        let answers = control.start();
+        let plan = &answers
+            .iter()
+            .find(|answer| answer.to_json()["answer"] == "plan_found")
+            .expect("a plan")
+            .to_json();
+        assert_eq!(plan["steps"][0]["duration"].to_string(), expected, "{constraint}: {plan}");
+        feed(&mut control, r#"{"event":"action_progress","action":1,"fraction":0.5}"#);
+        assert_eq!(control.beliefs().violation(), None, "{constraint}");
+        let answers = feed(&mut control, r#"{"event":"action_succeeded","action":1}"#);
+        assert_eq!(kinds(&answers), ["request_action"], "{constraint}: {answers:?}");
+        let answers = feed(&mut control, r#"{"event":"action_succeeded","action":2}"#);
+        assert!(answers.contains(&Answer::GoalReached), "{constraint}: {answers:?}");
+    }
+}
+
 #[test]
 fn an_action_without_duration_continues_after_progress() {
     let domain = "(define (domain d) (:requirements :strips :fluents)

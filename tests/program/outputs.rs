@@ -1,7 +1,8 @@
 //! Tests of output files: special files are written to, symbolic links are followed, and a file keeps its
 //! mode, owner and hard links.
 //!
-//! No test uses a real device, because a faulty program could replace it by a file.
+//! No test uses a device file of the system such as `/dev/null`, because a faulty program could replace it. A
+//! test creates its own device in a temporary directory.
 
 use std::fs;
 use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _, PermissionsExt as _, symlink};
@@ -99,6 +100,28 @@ fn traces_follow_links_and_write_to_fifos() {
     assert!(trace.as_array().is_some_and(|events| events.len() > 10));
     assert!(pipe.symlink_metadata().expect("a FIFO").file_type().is_fifo());
     assert!(link.symlink_metadata().expect("a link").is_symlink());
+}
+
+/// As many links as Linux follows are followed.
+#[test]
+fn long_chains_of_links_are_followed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |number: usize| folder.path().join(format!("link-{number}"));
+    let target = folder.path().join("target");
+    symlink(&target, path(1)).expect("a link");
+    for number in 2..=41 {
+        symlink(path(number - 1), path(number)).expect("a link");
+    }
+    let plan = |number: usize| {
+        let file = path(number).display().to_string();
+        metaplan(&["plan", "missions/ugv.toml", "--output", &file])
+    };
+    assert_eq!(plan(40).status, 0);
+    assert!(fs::read_to_string(&target).expect("a plan").contains("move"));
+    let outcome = plan(41);
+    assert_eq!(outcome.status, 3, "{outcome:#?}");
+    assert!(outcome.stderr.contains("error[M109]: the file cannot be written"), "{outcome:#?}");
+    assert!(path(41).symlink_metadata().expect("a link").is_symlink());
 }
 
 #[test]

@@ -9,8 +9,8 @@ use serde_json::Value;
 
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root};
 
-/// Number of drawings of each picture on a page, for columns of different widths. Plans shown side by side
-/// have two drawings.
+/// Number of drawings of each picture on a page, for columns of different widths. Plans shown side by side have
+/// two drawings. No picture in these tests is too wide for the narrow columns, for which it would not be drawn.
 const DRAWINGS: usize = 3;
 const MAX_PAGE_BYTES: usize = 500_000;
 

@@ -38,7 +38,8 @@ pub(super) fn task(model: &Model) -> Found {
     let scales = [&model.objective.scale, &model.time_scale, &model.number_scale];
     require(scales.iter().all(|scale| scale.is_positive()), || "a scale that is not positive".into())?;
     for uses in &model.uses {
-        // An operator chooses a design for each place in the list; the formula has one choice for each slot.
+        // A slot may occur only once in the list: the operator chooses a design for each entry, but the formula
+        // has only one choice for each slot.
         require(are_distinct(uses.iter().map(|(slot, _)| *slot)), || "a slot that is used twice".into())?;
         for (slot, designs) in uses {
             let slot = model.slots.get(*slot as usize).ok_or("a slot that is not there")?;

@@ -137,9 +137,9 @@ impl Diagnostic {
     }
 }
 
-/// Limit on the number of diagnostics of one pass (parsing or checking) over one file. One more diagnostic is still
-/// stored; if there are several more, the message P119 with their number is stored instead. A file in another
-/// language would produce very many.
+/// Maximum number of diagnostics of one pass (parsing or checking) over one file. If there is exactly one more,
+/// it is reported, too; if there are more, the message P119 with their number is. Otherwise a file in another
+/// language would produce very many diagnostics.
 const MAX_DIAGNOSTICS: usize = 200;
 
 #[derive(Debug)]

@@ -48,7 +48,7 @@ impl<'a> Validator<'a> {
     /// `separation` apart, in the domain's time unit.
     #[must_use]
     pub fn concurrent(self, separation: BigRational) -> Self {
-        self.options(Options { concurrent: true, tolerance: separation })
+        self.options(Options::default().with_concurrent(true).with_tolerance(separation))
     }
 
     /// Parses and executes a plan. An invalid plan is not an error: see [`Verdict::violation`].

@@ -436,7 +436,7 @@ fn missions_are_ground_as_by_brute_force() {
         check("ugv", seed, [4, 3, k], "c,n,f,o");
         check("uuv", seed, [1, 2, k], "c,n,f,o");
     }
-    // Battery levels are objects, so there are many of them.
+    // With battery levels as objects there are many objects, so this mission is small.
     check("uuv", 1, [1, 1, 1], "b");
 }
 

@@ -1,5 +1,6 @@
-//! Numbers that are added to each other with fractional coefficients, so that grounding stores multiples of
-//! them. The results must equal those with exact rationals, which store no multiples.
+//! Tests of tasks in which numbers are added to each other with fractional factors. Grounding to integers then
+//! stores multiples of these numbers. The results must equal those with exact rationals, which store the
+//! numbers themselves.
 
 use metaplan_planner::{
     Config, Engine, GroundConfig, Status, ground, ground_exact, optimize, optimize_exact,

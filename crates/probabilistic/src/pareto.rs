@@ -378,9 +378,9 @@ fn kept_limit(limit: f64) -> f64 {
     limit + 1e-12 * limit.max(1.0)
 }
 
-/// Upper bound on the first loss of a mixture (randomisation) of the two vertices of `segment` that satisfies
-/// the limit. Without a segment, the bound of the first vertex. Infinite if rounding errors prevent a proof
-/// that the limit is satisfied.
+/// Upper bound on the first loss of a mixture (randomisation) of the two vertices of `segment`. The mixture is
+/// chosen so that its second loss is within `limit`. Without a segment, the bound is that of the first vertex.
+/// Infinite if, because of rounding errors, it is not proved that the second loss is within the limit.
 fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limit: &N) -> f64 {
     let worst = |point: &Point<N>, number: usize| point.losses[number].to_f64() + point.errors[number];
     let limit = limit.to_f64();

@@ -1,4 +1,5 @@
-//! Checks that the heuristics are admissible and consistent.
+//! Checks that the estimates of [`Bounds`] (pattern databases, cost partitionings, resources) are consistent,
+//! and 0 in goal states, so that they are admissible. The tests of LM-cut are in `search_driver.rs`.
 
 use metaplan_search::bounds::Bounds;
 use task::context::Context;

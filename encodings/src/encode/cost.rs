@@ -23,8 +23,8 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::interference::Interference;
 use crate::sat::Lit;
 
-/// Maximum number of different accumulated amounts in the order encoding. With more amounts, or if one source of cost
-/// requires more than 50 times as many additions, the sum is encoded by binary addition.
+/// Maximum number of different accumulated amounts in the order encoding. With more amounts, or if one source
+/// of cost requires more than 50,000 additions (50 times this number), the sum is encoded by binary addition.
 const AMOUNT_LIMIT: usize = 1_000;
 
 /// Cost limit of an encoding. With `CostEncoding::Sum`, only plans with a cost of at most `limit` are

@@ -106,7 +106,7 @@ pub enum VariableMeaning {
     Fires { operator: u32, effect: u32, step: u32 },
     /// The body of the rule with this index in a layer of derived variables holds before the step.
     Body { layer: u32, rule: u32, step: u32 },
-    /// The derived variable is derived in a later round of its layer than round `rounds`.
+    /// The derived variable is derived after round `rounds` of its layer. Rounds are counted from 1.
     Later { variable: u32, rounds: u32, step: u32 },
     /// A bit of a number, or of an intermediate result.
     Bit { bit: u32 },
@@ -127,8 +127,8 @@ pub struct Formula {
     literals: Vec<Lit>,
     /// For each clause: its end in `literals`, and its family.
     clauses: Vec<(u32, Family)>,
-    /// For each literal: the number, from 1, of the last clause to which it was added; 0 if no clause
-    /// contains it or this clause was dropped.
+    /// For each literal: the number, from 1, of the last clause to which it was added. 0 if it was added to no
+    /// clause, or if that clause was dropped.
     last: Vec<u32>,
 }
 

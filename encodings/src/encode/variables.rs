@@ -42,8 +42,8 @@ impl Variables {
         for (variable, value) in task.initial.values.iter().enumerate() {
             possible[variable][*value as usize] = true;
         }
-        // Both values of each derived variable that has a rule are possible at every step, because the other
-        // variables determine them at every step.
+        // A derived variable that has a rule is evaluated again at every step, so both values are possible at
+        // every step.
         for values in &mut possible[task.basic..] {
             values[1] = true;
         }

@@ -7,7 +7,7 @@ use search::search::Heuristic;
 use task::number::Int;
 use task::task::{Fact, Operator, State, Task};
 
-/// Lower bound on the cost to the goal from the number of false goal facts.
+/// Lower bound on the cost to the goal. It is computed from the number of false goal facts.
 #[derive(Debug)]
 pub struct GoalCount {
     /// Goal facts of basic variables. Goal facts of derived variables are not counted, because a single step can change

@@ -143,7 +143,9 @@ fn observe(node: &Arc<Node>, duration: Duration, stop: &AtomicBool) -> Result<Ro
             note(noted.entry(status.name.clone()).or_default(), status);
         }
     })?;
-    let (mut counts, start) = (BTreeMap::<String, (Instant, Arc<AtomicU64>)>::new(), Instant::now());
+    // Signals compare rates in the time of the node, which may be simulated.
+    let clock = node.clock();
+    let (mut counts, start) = (BTreeMap::<String, (Duration, Arc<AtomicU64>)>::new(), Instant::now());
     while start.elapsed() < duration && !stop.load(Ordering::Relaxed) {
         for (topic, kind) in node.endpoints().topics {
             if RATED.contains(&kind.as_str()) && !counts.contains_key(&topic) {
@@ -152,14 +154,17 @@ fn observe(node: &Arc<Node>, duration: Duration, stop: &AtomicBool) -> Result<Ro
                 node.subscribe_any(&topic, move || {
                     counter.fetch_add(1, Ordering::Relaxed);
                 })?;
-                counts.insert(topic, (Instant::now(), count));
+                counts.insert(topic, (clock.elapsed(), count));
             }
         }
         std::thread::sleep(SEARCH_PERIOD.min(duration.saturating_sub(start.elapsed())));
     }
     let endpoints = node.endpoints();
-    let rates = counts.into_iter().map(|(topic, (since, count))| {
-        (topic, count.load(Ordering::Relaxed) as f64 / since.elapsed().as_secs_f64())
+    let now = clock.elapsed();
+    let rates = counts.into_iter().filter_map(|(topic, (since, count))| {
+        let seconds = now.saturating_sub(since).as_secs_f64();
+        // In a paused simulation no time passes, and no rate can be computed.
+        (seconds > 0.0).then(|| (topic, count.load(Ordering::Relaxed) as f64 / seconds))
     });
     let rates = rates.collect();
     let state = |name: &String| {

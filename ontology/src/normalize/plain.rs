@@ -164,7 +164,8 @@ fn kinds(graph: &Graph) -> FxHashMap<&str, DeclaredKinds> {
     kinds
 }
 
-/// Returns the subjects of annotated axioms, whose triples may be part of a pattern.
+/// Returns the IRIs that are the subject of an annotated axiom (`owl:annotatedSource`). Their triples are not
+/// read one by one, because an annotation refers to several of them.
 fn patterns(graph: &Graph) -> FxHashSet<&str> {
     let annotated = graph.iter().filter(|(_, triple)| triple.predicate.as_str() == owl::ANNOTATED_SOURCE);
     annotated.filter_map(|(_, triple)| iri_of(&triple.object)).collect()

@@ -29,7 +29,8 @@ pub(crate) struct Origin {
 pub(crate) const VARIABLE: &str = "urn:metaplan:variable:";
 /// Prefix of the IRI of a variable that represents an individual.
 pub(crate) const INDIVIDUAL: &str = "urn:metaplan:individual:";
-/// Individual of the atom `sameAs(TRUE, TRUE)`, the only atom of an empty body or head.
+/// Individual of the atom `sameAs(TRUE, TRUE)`. Normalisation writes this atom into an empty body or head, and
+/// the conversion to rules removes it.
 pub(crate) const TRUE: &str = "urn:metaplan:true";
 /// Annotation property whose value is the index of a rule in the list of [`Origin`]s.
 pub(crate) const ORIGIN: &str = "urn:metaplan:origin";

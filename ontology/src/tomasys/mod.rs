@@ -91,7 +91,7 @@ pub struct Measurement {
     pub value: Option<BigRational>,
 }
 
-/// An action of the task plan.
+/// An individual of the class Action: the knowledge base states which functions this kind of action requires.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Action {
     /// The action.

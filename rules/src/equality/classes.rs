@@ -14,8 +14,8 @@ use crate::fact::{Arguments, Fact};
 use crate::rule::RuleIdentity;
 use crate::symbol::Symbol;
 
-/// A derivation step: a fact with its reason. A premise that is the pair of an edge has the reason `Asserted`; the
-/// derivation of the pair is in [`Edge::proof`].
+/// Step of a derivation: a fact with its reason. The reason `Asserted` is also given to a premise that an
+/// earlier edge supplies; [`Edge::proof`] of that edge has its derivation.
 pub(super) type Step = DerivationStep;
 
 /// Numbers edges in the order of creation.

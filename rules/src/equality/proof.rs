@@ -297,9 +297,9 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// Returns the recorded values `bound` of a rule's variables. If the rule compares a variable with a constant by
-    /// `sameAs`, the constant replaces the recorded value, which is its representative. The reason is that no atom of
-    /// the rule supports the equality between the two.
+    /// Returns the values `bound` of a rule's variables, as explanations show them. If the rule compares a
+    /// variable with a constant by `sameAs`, the recorded value is the representative of the constant. The
+    /// constant is returned instead, because no atom of the rule supports that the two are equal.
     fn as_written(&self, rule: &Rule, bound: &[Symbol]) -> Vec<Symbol> {
         let mut values = bound.to_vec();
         for atom in &rule.body {

@@ -1,5 +1,6 @@
-//! Matches of a rule's body in an immutable set of facts: nested-loop joins. The atom with the fewest
-//! candidate rows comes first; other atoms are tested as soon as their variables are bound.
+//! Matches of a rule's body in an immutable set of facts, by nested-loop joins. Each step first evaluates the
+//! atoms that are not relations (tests, built-ins, aggregates) and whose variables are bound. Then it joins the
+//! relation with the fewest candidate rows.
 
 use std::collections::BTreeSet;
 use std::rc::Rc;

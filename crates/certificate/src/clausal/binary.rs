@@ -36,8 +36,9 @@ impl Formula {
                 let sign =
                     |literal: Literal, place: u32| if signs >> place & 1 == 1 { literal } else { -literal };
                 let (a, b, c) = (sign(a, 0), sign(b, 1), sign(c, 2));
-                // All three literals are false under exactly one assignment of the inputs, with `ones` true
-                // inputs. The clause then enforces the sum bit, which is true if `ones` is odd.
+                // The literals are all false under exactly one assignment of the three inputs, in which `ones`
+                // of them are true. Only then does the clause enforce the sum bit: true if `ones` is odd,
+                // otherwise false.
                 let ones = 3 - u32::count_ones(signs);
                 self.clause(&[a, b, c, if ones % 2 == 1 { s } else { -s }]);
             }

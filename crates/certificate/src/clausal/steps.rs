@@ -16,8 +16,8 @@ pub enum StepBound {
     /// The cost of the first T + 1 steps alone. T then does not depend on the values of a potential
     /// (table of lower bounds on the remaining cost).
     Spent,
-    /// The cost of the first T + 1 steps plus the potential (lower bound on the remaining cost),
-    /// which gives a smaller T and a smaller formula.
+    /// The cost of the first T + 1 steps plus the potential (lower bound on the remaining cost). T and the
+    /// formula are smaller than with [`StepBound::Spent`], or equal.
     Potential,
 }
 

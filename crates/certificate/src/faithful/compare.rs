@@ -380,9 +380,9 @@ impl<'c> Comparison<'c> {
         candidates
     }
 
-    /// Returns the designs with which an operator has these arguments, as positions in the slots'
-    /// lists of suitable designs. Returns `None` if no designs yield them, if the arguments do not
-    /// determine them, or if their combination is excluded.
+    /// Finds the designs with which the arguments of an operator are `objects`. A design is given by its
+    /// position in the list of suitable designs of its slot. Returns `None` if there are no such designs, if a
+    /// slot occurs in no argument, or if the combination is excluded.
     fn choice(&self, operator: &Operator, objects: &[u32]) -> Option<Vec<u32>> {
         let model = self.task.model;
         let uses = &model.uses[operator.uses as usize];

@@ -10,8 +10,8 @@ use crate::faithful::linear::Linear;
 use crate::faithful::translation::Translation;
 use crate::model::Operator;
 
-/// Upper limit on the number of partial states when one variable is compared in one case (see
-/// [`Variable::agrees`]). A case split replaces a partial state by several.
+/// Upper limit on the number of partial states that are examined for one variable (see [`Variable::agrees`]).
+/// If a truth value is open, a partial state is replaced by several.
 const SPLIT_LIMIT: usize = 1_024;
 
 #[derive(Clone, Copy)]

@@ -1,5 +1,5 @@
-//! Conditions of an action instance over the state before it, and partial states that decide such
-//! conditions.
+//! Conditions of an action instance, as formulas over the state before the action. Partial states: known truth
+//! values and comparisons, from which a condition may follow or be refuted.
 
 use std::collections::BTreeMap;
 

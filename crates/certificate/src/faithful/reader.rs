@@ -24,9 +24,9 @@ const SIZE_LIMIT: usize = 200_000;
 /// [`Reader::unfold`]).
 const WORK_LIMIT: usize = 16 * SIZE_LIMIT;
 const VARIABLE_LIMIT: usize = 10_000;
-/// Maximum nesting depth, counted from the outermost derived atom, at which derived atoms are replaced by their
-/// rules recursively. This bounds the call stack. Deeper atoms are evaluated separately, with an explicit stack
-/// (see [`Reader::unfold`]).
+/// Maximum nesting depth at which derived atoms are replaced by their rules recursively. It counts all
+/// conditions (`and`, `or`, `not`, quantifiers) from the outermost derived atom on, and so bounds the call
+/// stack. Deeper atoms are evaluated separately, with an explicit stack (see [`Reader::unfold`]).
 const UNFOLDING_LIMIT: usize = 100;
 
 /// Key of the fluent `total-time`, which only metrics contain.

@@ -150,7 +150,7 @@ fn overwrite(mut file: File, source: &Path) -> io::Result<()> {
 /// in `/proc`, as the file descriptor `/dev/fd/3` is.
 fn followed(path: &Path) -> io::Result<(PathBuf, bool)> {
     let (mut path, mut is_descriptor) = (path.to_owned(), false);
-    for _ in 0..MAX_LINKS {
+    for _ in 0..=MAX_LINKS {
         let Ok(next) = std::fs::read_link(&path) else { return Ok((path, is_descriptor)) };
         let directory = directory(&path).to_owned();
         is_descriptor |= directory.canonicalize().is_ok_and(|directory| directory.starts_with("/proc"));

@@ -165,9 +165,10 @@ mod tests {
         check("t:isQAtype(?q, r:wind) ^ not t:hasValue(?q, 3)", [false, true]);
         check("t:hasValue(r:obs_light, ?x)", [true, false]);
         check("t:hasQAestimation(?fd, ?q) ^ t:hasValue(?q, ?x)", [false, false]);
-        // Only an attribute with a requirement or an operator matches.
+        // Here `?r` is the subject of a requirement, not a required value, so that every attribute may match.
         let bounded = "t:hasRequirement(?r, ?k) ^ t:isQAtype(?r, ?k)";
         check(&format!("{bounded} ^ t:isQAtype(?q, ?k) ^ t:hasValue(?q, ?x)"), [true, true]);
+        // Only an attribute with a requirement or an operator matches, and these two have none.
         let bounded = "t:hasRequirement(?fd, ?r) ^ t:isQAtype(?r, ?k)";
         check(&format!("{bounded} ^ t:isQAtype(?q, ?k) ^ t:hasValue(?q, ?x)"), [false, false]);
         check("t:qa_comparison_operator(?k, ?o) ^ t:isQAtype(?q, ?k) ^ t:hasValue(?q, ?x)", [false, false]);

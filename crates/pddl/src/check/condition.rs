@@ -181,8 +181,8 @@ impl<'a> Checker<'a> {
     }
 
     fn argument_fits(&self, argument: &ArgumentType<'a>, expected: &TypeExpression) -> bool {
-        // A variable of a wider type is narrowed by the atom. An object has exactly the types of its
-        // declarations.
+        // A variable may have a wider type than the parameter, because the atom restricts its values. So it
+        // suffices that the types overlap. An object has exactly the types of its declarations.
         match argument {
             ArgumentType::Variable(r#type) => self.symbols.types.overlap(r#type, expected),
             ArgumentType::Object(types) => types.iter().any(|r#type| {

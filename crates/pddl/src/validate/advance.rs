@@ -10,7 +10,7 @@ use crate::ast::{
 };
 
 use super::effects::{Change, Changes, Ground};
-use super::evaluate::{Bindings, Evaluator};
+use super::evaluate::metric;
 use super::execute::Execution;
 use super::happening::Part;
 use super::options::Options;
@@ -52,7 +52,8 @@ pub struct ValueChange {
     pub assigned: bool,
 }
 
-/// Executes one step in the initial state of a problem. Timed initial literals are not applied.
+/// Executes one step in the initial state of a problem. Timed initial literals are not applied. A duration that is
+/// neither stated nor determined is chosen (see [`Options::chosen_durations`]).
 ///
 /// # Errors
 /// Returns the violation that prevents the step. With `forced`, conditions and interference are not checked;
@@ -66,7 +67,7 @@ pub fn advance(
 ) -> Result<Advance, Box<Violation>> {
     let reduced = relevant(domain, problem, std::slice::from_ref(step), None);
     let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
-    advance_from(&Execution::new(&world, &Options::default()), step, forced)
+    advance_from(&Execution::new(&world, &Options::default().with_chosen_durations(true)), step, forced)
 }
 
 /// Executes each step separately in the initial state of a problem, like [`advance`] with `forced = false`. Also
@@ -78,7 +79,7 @@ pub fn advance_each(
 ) -> (Option<BigRational>, Vec<Result<Advance, Box<Violation>>>) {
     let reduced = relevant(domain, problem, steps, None);
     let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
-    let options = Options::default();
+    let options = Options::default().with_chosen_durations(true);
     let initial = Execution::new(&world, &options);
     let metric = metric(&world, &initial.state, &BigRational::default());
     (metric, steps.iter().map(|step| advance_from(&initial, step, false)).collect())
@@ -173,12 +174,6 @@ pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational
     let options = Options::default();
     let execution = Execution::new(&world, &options);
     metric(&world, &execution.state, total_time)
-}
-
-pub(super) fn metric(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
-    let metric = world.problem.metric.as_ref()?;
-    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, state) };
-    evaluator.value(&metric.expression, &Bindings::default()).ok()
 }
 
 fn note(changes: &Changes, assigned: &mut FxHashMap<Ground, bool>) {

@@ -9,9 +9,8 @@ use rustc_hash::FxHashSet;
 
 use crate::ast::{Comparison, Condition, ConditionTime, Domain, EffectTime, Expression, Problem};
 
-use super::advance::metric;
 use super::effects::{Changes, Ground};
-use super::evaluate::{Bindings, Evaluator};
+use super::evaluate::{Bindings, Evaluator, metric};
 use super::execute::Execution;
 use super::happening::Part;
 use super::options::Options;

@@ -87,9 +87,9 @@ impl<'p> Closure<'_, 'p> {
         }
     }
 
-    /// Returns the head arguments for which the condition of an axiom holds, ignoring its opaque
-    /// parts. A seed restricts the solutions to those in which the occurrence matches the given
-    /// fact.
+    /// Returns the head arguments for which the condition of an axiom holds if its opaque parts count as true.
+    /// `seed` is an atom of the condition (its occurrence) and a fact. With a seed, only solutions in which the
+    /// atom is the fact are returned.
     fn heads(&self, axiom: usize, seed: Option<(&Occurrence<'p>, &Arguments)>) -> Vec<Arguments> {
         let Axiom { derived, opaque } = &self.stratum.axioms[axiom];
         let derived: &'p Derived = derived;

@@ -227,6 +227,13 @@ impl<'e, 'p> Evaluator<'e, 'p> {
     }
 }
 
+/// Returns the metric value of a plan that ends in this state. `None` without a metric or if the value is undefined.
+pub(super) fn metric(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
+    let metric = world.problem.metric.as_ref()?;
+    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, state) };
+    evaluator.value(&metric.expression, &Bindings::default()).ok()
+}
+
 impl<'p> World<'p> {
     /// Calls `visit` for each assignment of objects to `variables`, until `visit` returns `false` or the
     /// budget is spent. Returns `true` if all assignments were visited.

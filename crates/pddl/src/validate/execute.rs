@@ -3,12 +3,12 @@
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
 
-use crate::ast::{ActionBody, Comparison, ConditionTime, EffectTime, InitialElement};
+use crate::ast::{ActionBody, Comparison, ConditionTime, Direction, EffectTime, InitialElement};
 use crate::number::show_number;
 
 use super::derive::derive_facts;
 use super::effects::{Changes, EffectError, Ground};
-use super::evaluate::{Evaluator, Undefined};
+use super::evaluate::{Evaluator, Undefined, metric};
 use super::explain::{undefined_text, unmet};
 use super::interference::Footprint;
 use super::options::Options;
@@ -146,7 +146,7 @@ impl<'e, 'p> Execution<'e, 'p> {
                 self.check_duration(step, time, *operator, duration, bound)?;
             }
         }
-        let duration = exact.or_else(|| step.text.duration.clone());
+        let duration = exact.or_else(|| step.text.duration.clone()).or_else(|| self.chosen_duration(&bounds));
         let Some(duration) = duration else {
             return Err(step.violation(
                 time,
@@ -159,6 +159,40 @@ impl<'e, 'p> Execution<'e, 'p> {
             return Err(step.violation(time, ViolationKind::Duration, message));
         }
         Ok(duration)
+    }
+
+    /// Returns the duration that the planner chooses, if it has to be chosen. `None` if no constraint bounds it on
+    /// the side that the metric prefers, or if a bound is strict.
+    fn chosen_duration(&self, bounds: &[(Comparison, BigRational)]) -> Option<BigRational> {
+        if !self.options.chosen_durations {
+            return None;
+        }
+        let is_strict = |(operator, _): &(Comparison, BigRational)| {
+            matches!(operator, Comparison::Greater | Comparison::Less)
+        };
+        if bounds.iter().any(is_strict) {
+            return None;
+        }
+        let with_operator =
+            |operator| bounds.iter().filter(move |bound| bound.0 == operator).map(|bound| &bound.1);
+        let (lower, upper) =
+            (with_operator(Comparison::GreaterOrEqual).max(), with_operator(Comparison::LessOrEqual).min());
+        let chosen = if self.rewards_time() { upper } else { lower }?;
+        let is_allowed =
+            lower.is_none_or(|lower| lower <= chosen) && upper.is_none_or(|upper| chosen <= upper);
+        is_allowed.then(|| chosen.clone())
+    }
+
+    /// Returns `true` if the metric prefers longer plans. The planner requires that the total time has a constant
+    /// factor in the metric, so that two total times in one state suffice.
+    fn rewards_time(&self) -> bool {
+        let at = |time: i32| metric(self.world, &self.state, &BigRational::from_integer(time.into()));
+        let (Some(zero), Some(one)) = (at(0), at(1)) else { return false };
+        match self.world.problem.metric.as_ref().map(|metric| metric.direction) {
+            Some(Direction::Minimize) => one < zero,
+            Some(Direction::Maximize) => one > zero,
+            None => false,
+        }
     }
 
     fn check_duration(

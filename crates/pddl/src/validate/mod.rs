@@ -46,7 +46,7 @@ pub use plan::{PlanStep, PlanText};
 pub use relevant::may_read;
 pub use verdict::{Unmet, Verdict, Violation, ViolationKind};
 
-use advance::metric;
+use evaluate::metric;
 use evaluate::{Bindings, Evaluator};
 use execute::Execution;
 use explain::unmet;
@@ -89,12 +89,13 @@ pub fn validate_within(
     world.budget.check(verdict)
 }
 
-/// Returns the metric value of a plan, as [`validate`] computes it with the default options, but faster in a large
-/// initial state. Returns `None` if the plan is not valid, or if the metric is missing or undefined.
+/// Returns the metric value of a plan, as [`validate`] computes it with [`Options::chosen_durations`], but
+/// faster in a large initial state. Returns `None` if the plan is not valid, or if the metric is missing or
+/// undefined.
 pub fn metric_of(domain: &Domain, problem: &Problem, plan: &PlanText) -> Option<BigRational> {
     let reduced = relevant(domain, problem, &plan.steps, Some(&problem.goal));
     let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
-    judge_readings(&world, plan, &Options::default()).metric
+    judge_readings(&world, plan, &Options::default().with_chosen_durations(true)).metric
 }
 
 /// Executes all readings of a plan (choices of one schema for each ambiguous step) and returns the

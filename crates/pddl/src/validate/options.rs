@@ -20,6 +20,10 @@ pub struct Options {
     ///
     /// The times of timed initial literals are exact in both cases.
     pub tolerance: BigRational,
+    /// Whether a step may lack a duration that no equality determines. The step then takes the shortest time
+    /// that its constraints allow, or the longest time if the metric rewards time, as the planner chooses without
+    /// overlapping actions. The default is `false`: such a step violates the plan.
+    pub chosen_durations: bool,
 }
 
 impl Options {
@@ -35,6 +39,12 @@ impl Options {
         Self { tolerance, ..self }
     }
 
+    /// Sets whether durations that are neither stated nor determined are chosen: see [`Options::chosen_durations`].
+    #[must_use]
+    pub fn with_chosen_durations(self, chosen_durations: bool) -> Self {
+        Self { chosen_durations, ..self }
+    }
+
     /// Maximum deviation of a stated duration from the exact one.
     pub(super) fn slack(&self) -> BigRational {
         let tolerance = self.tolerance.clone();
@@ -44,6 +54,10 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { concurrent: false, tolerance: BigRational::new(BigInt::from(1), BigInt::from(1000)) }
+        Self {
+            concurrent: false,
+            tolerance: BigRational::new(BigInt::from(1), BigInt::from(1000)),
+            chosen_durations: false,
+        }
     }
 }

@@ -229,8 +229,8 @@ fn with_horizon(task: &Task<Rational>, horizon: usize) -> Task<Rational> {
     task
 }
 
-/// Heuristics of a task in rationals, from the task without numeric variables and with costs that
-/// are scaled and rounded down to integers.
+/// Lower bounds for a task with rational numbers. They are computed on a copy of the task without numeric
+/// variables, in which the costs are scaled and rounded down to integers.
 pub struct RoundedBounds {
     pub(crate) bounds: Bounds,
     /// Value of one unit of the integer costs.

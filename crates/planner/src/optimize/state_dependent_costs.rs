@@ -46,7 +46,7 @@ impl Interval {
     }
 }
 
-/// Exact costs of paths, in integers. A cost of 1 of an operator of the task is `factor` here.
+/// Exact costs of paths, as integers: the costs of the task multiplied by `factor`.
 pub(super) struct StateDependentCosts {
     factor: Int,
     /// Measured fluents with their cost per unit of the stored number.

@@ -21,8 +21,8 @@ type KeptDesigns = Arc<[Vec<u32>]>;
 
 type RestrictedSlots = (KeptDesigns, Arc<[SlotUse]>);
 
-/// Restricted data that several operators share. Keys contain addresses of data in the original
-/// task, which outlives the cache, and of the lists of kept designs, which `slots` keeps alive.
+/// Restricted data that several operators share. The keys are addresses: equal addresses mean equal data. The
+/// data outlives the cache, because it belongs to the original task or is a list of kept designs in `slots`.
 #[derive(Default)]
 struct SharedTables {
     slots: FxHashMap<(*const SlotUse, u32), RestrictedSlots>,

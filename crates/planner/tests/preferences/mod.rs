@@ -175,7 +175,8 @@ fn divisors_that_may_be_zero_are_refused() {
     }
 }
 
-/// The start adds the atom that the end reads, so they would interfere if the duration is 0.
+/// The start adds `b`, and the constraint reads `b` at the end. If the duration is 0, both are one happening
+/// and interfere.
 #[test]
 fn sometime_before_over_start_and_end_needs_a_positive_duration() {
     let task = |duration: u32| {

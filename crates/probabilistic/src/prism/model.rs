@@ -140,7 +140,7 @@ impl<N: Number> Program<N> {
                     Ok(compiled) => match &item.action {
                         None => structure.states.push(compiled),
                         Some(None) => structure.unnamed.push(compiled),
-                        // Without a command for the action, the item never applies.
+                        // A reward for an action that no command has never applies.
                         Some(Some(name)) => {
                             if let Some(number) = numbers.get(name.as_str()) {
                                 structure.actions[*number as usize].push(compiled);

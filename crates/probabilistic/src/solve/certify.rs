@@ -16,7 +16,8 @@ use crate::solve::work::Work;
 
 const MAX_ROUNDS: usize = 200;
 
-/// Maximum number of sweeps that improve the policy before its chain is solved again.
+/// Maximum number of sweeps that improve the policy with the greatest expected number of steps before its chain
+/// is solved again.
 const SWEEPS: usize = 10;
 
 /// Upper limit on the relative rounding error of evaluating a row (the equation of a choice) that was built

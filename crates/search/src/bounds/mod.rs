@@ -170,9 +170,9 @@ impl Bounds {
         })
     }
 
-    /// Returns an upper bound on the number of steps of plans with a cost of at most `limit`, and
-    /// the operators that may occur at each step of such plans up to `horizon`. `None` means that
-    /// cost or steps are not limited.
+    /// Returns an upper bound on the number of steps of plans that cost at most `limit`, and the operators that
+    /// may occur at each step of such plans. The steps are considered up to the bound and to `horizon`. `limit`
+    /// and `horizon` are `None` if cost or steps are not limited.
     ///
     /// # Errors
     /// Fails if the deadline has passed or the interrupt flag is set.

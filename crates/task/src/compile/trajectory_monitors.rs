@@ -352,7 +352,9 @@ impl<'t> Monitors<'t> {
         hard: bool,
         place: (File, Span),
     ) -> Result<Condition, Error> {
-        // What changes the first condition reads the atom that changes of the second condition add.
+        // A happening that changes the first condition reads the atom `was met`, and one that changes the
+        // second condition adds it. So the start and the end of one action must not coincide if they change
+        // these conditions.
         self.separate(&[first, second], place)?;
         let was_met = self.remember("was met", self.initial.holds(second));
         let at_first = self.initial.holds(first);

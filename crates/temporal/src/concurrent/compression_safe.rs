@@ -1,11 +1,10 @@
 //! Compression-safe actions: the end can directly follow the start in a sequence, so that the
 //! search applies both in one step.
 //!
-//! Happenings that do not interfere are unordered in time, independent of their order in a
-//! sequence. If an end interferes with no happening that can take place while its action runs, the
-//! end can be moved to its start without changing times or states. Coles et al. \[1\] require
-//! actions that only add facts at their end. The condition here uses the facts that hold while the
-//! action runs, so more actions qualify and no plan is lost.
+//! A sequence orders only happenings that interfere. If an end interferes with no happening that can take place
+//! while its action runs, it can be moved directly behind its start in the sequence, and times and states
+//! remain the same. Coles et al. \[1\] require actions that only add facts at their end. The condition here
+//! uses the facts that hold while the action runs, so more actions qualify and no plan is lost.
 //!
 //! \[1\] A. Coles, M. Fox, K. Halsey, D. Long, A. Smith: Managing concurrency in temporal planning using
 //! planner-scheduler interaction, Artificial Intelligence 173, 2009.
@@ -39,7 +38,8 @@ impl<T: TimeNumber> Index<'_, T> {
         if !own.joint.is_empty() || end.writes.iter().any(|id| self.joint.binary_search(id).is_ok()) {
             return false;
         }
-        // Other runs of an instance that can overlap itself may start or end in between.
+        // If runs of this instance can overlap, another run may start or end between the start and the end of
+        // this one.
         let alone = own.under_way.is_none();
         let Some(invariant) = self.invariant(own, alone, left) else { return false };
         let waiting = end.accesses.marks.iter().filter_map(|key| self.waiting.get(key));

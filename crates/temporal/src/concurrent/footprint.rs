@@ -1,8 +1,9 @@
 //! Read and write sets of happenings, for the PDDL 2.1 rule of no moving targets \[1\].
 //!
-//! A happening reads every atom and number that its condition or effects mention, even if the value
-//! does not matter in some states. This includes all instances of atoms with quantified variables,
-//! and all atoms on which a derived predicate depends.
+//! A happening reads every atom and number that its condition, the conditions of its effects, or assigned
+//! values mention, even if the value does not matter in some states. This includes all instances of atoms with
+//! quantified variables, and all atoms on which a derived predicate depends. What an effect changes is written,
+//! not read.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 

@@ -162,7 +162,8 @@ impl<T: TimeNumber> InterferenceConstraints<T> {
         self.marks.extend(&other.marks);
     }
 
-    /// Sorts both lists, and keeps only the largest distance for each access.
+    /// Sorts `after` and `marks` and removes duplicates. Of several distances for the same access in `after`,
+    /// the largest is kept.
     pub(super) fn tidy(&mut self) {
         self.after.sort_unstable_by(|a, b| (a.0, b.1).cmp(&(b.0, a.1)));
         self.after.dedup_by_key(|(key, _)| *key);

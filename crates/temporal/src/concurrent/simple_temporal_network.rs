@@ -58,8 +58,8 @@ pub(super) struct SimpleTemporalNetwork<T: TimeNumber = Int> {
     /// Running actions, sorted by instance. Runs of one instance are in the order of their starts,
     /// which is also the order of their ends.
     opens: Vec<RunningAction<T>>,
-    /// Time point and offset at which all further happenings take place until every over-all
-    /// condition holds again. `None` if all these conditions hold.
+    /// If an over-all condition of a running action is violated, simultaneous happenings have to repair it:
+    /// this is their time, as a time point and an offset. `None` if all these conditions hold.
     group: Option<(TimePoint, T)>,
     /// Time of the latest happening, not counting timed initial literals; -1 before the first one.
     latest: TimeExpression<T>,

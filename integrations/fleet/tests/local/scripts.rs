@@ -88,7 +88,8 @@ pub(super) fn assert_replayed(
     compared
 }
 
-/// Removes explanations from answers, because several explanations may be valid.
+/// Removes the reasons of changed designs and objectives from answers, because several derivations may be
+/// valid. The reasons of other answers are compared.
 pub(super) fn essence(answers: &[Value]) -> Vec<Value> {
     let mut answers = answers.to_vec();
     for answer in &mut answers {

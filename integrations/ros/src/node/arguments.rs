@@ -126,9 +126,11 @@ fn rule(text: &str) -> Result<Rule, Message> {
         || invalid(format!("`{text}` is not a rule; it should be `from:=to`, or `node:from:=to`"));
     let (selector, to) = text.split_once(":=").ok_or_else(malformed)?;
     let (node, from) = match selector.split_once(':') {
-        // The prefixes `rostopic://` and `rosservice://` are ignored.
-        Some((_, from)) if from.starts_with("//") => (None, from.trim_start_matches('/')),
-        Some((node, from)) => (Some(node.to_owned()), from),
+        // The prefixes `rostopic://` and `rosservice://` are removed: such a rule applies to all kinds of names.
+        Some((node, from)) => match from.strip_prefix("//") {
+            Some(from) => (None, from),
+            None => (Some(node.to_owned()), from),
+        },
         None => (None, selector),
     };
     if from.is_empty() || to.is_empty() {
@@ -267,6 +269,14 @@ mod tests {
         let node = ros.node("metaplan");
         assert_eq!(node.to_string(), "/metaplan");
         assert_eq!(ros.remap("a", &node), "/c");
+    }
+
+    #[test]
+    fn schemes_of_names_are_removed() {
+        let (_, ros) = read("p --ros-args -r __ns:=/uuv -r rostopic:///a:=/b -r rosservice://c:=d");
+        let node = ros.node("metaplan");
+        assert_eq!([ros.remap("/a", &node), ros.remap("c", &node)], ["/b", "/uuv/d"]);
+        assert_eq!(ros.remap("a", &node), "/uuv/a");
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub(crate) enum Outcome {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Seen {
-    /// The conditions of this mode hold.
+    /// The observable conditions of this mode hold. The last mode that was set is assumed if it has none.
     Mode(String),
     /// The conditions of no mode hold.
     Nothing,
@@ -62,8 +62,8 @@ enum Undo {
 }
 
 impl Procedures {
-    /// Creates the procedures, which are given by function and mode. Events about their steps are
-    /// passed to `report`.
+    /// Creates the procedures. `functions` has one for each mode of each function. `report` receives the events
+    /// about their steps.
     pub(crate) fn new(
         node: &Arc<Node>,
         functions: BTreeMap<String, BTreeMap<String, Procedure>>,

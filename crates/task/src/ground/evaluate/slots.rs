@@ -53,8 +53,9 @@ pub fn open(
         Expression::Product(parts, place) => {
             let (mentioning, closed): (Vec<_>, Vec<_>) =
                 parts.iter().partition(|part| !slots_of_expression(part, slots.parameters).is_empty());
-            // If only one factor mentions slots, its tables are scaled by the other factors. Otherwise, the whole
-            // product becomes one table.
+            // If only one factor mentions slots, it is evaluated to tables, which are multiplied by the other
+            // factors. If several factors mention slots, the product is evaluated to one table over all their
+            // slots.
             let [part] = mentioning[..] else {
                 return table(world, expression, mentioned, binding, slots, undefined);
             };

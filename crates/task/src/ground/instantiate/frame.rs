@@ -1,9 +1,9 @@
 //! Design data that several instances of an action schema share.
 //!
-//! Suitable designs, forbidden combinations, durations and the effects that depend on designs are determined
-//! by only a few parameters of the schema, the key parameters. For example, the battery use of a route
-//! depends on the route, but not on the battery level. The data are computed once for each combination of
-//! objects for the key parameters.
+//! Suitable designs, forbidden combinations, durations and the effects that depend on designs are determined by
+//! only a few parameters of the schema, the key parameters. For example, the battery use of a move depends on
+//! its two places, but not on the item that the robot carries. The data are computed once for each combination
+//! of objects for the key parameters.
 
 use std::sync::Arc;
 

@@ -41,8 +41,8 @@ pub(super) fn duration_of(position: usize) -> Column {
 pub(super) struct RunningAction {
     pub(super) instance: u32,
     end: Affine,
-    /// Value of the number that holds the duration of this run, if the instance has such a number.
-    /// Other runs of the instance may have other values.
+    /// Some instances have a numeric variable for the duration, which all their runs share. This is its value
+    /// for this run. `None` if the instance has no such variable.
     number: Option<Affine>,
     /// Time of the start, or of the last later happening that wrote an atom or number in the joint
     /// over-all condition of the instance (see [`Instance::joint`]). `None` if the instance has no
