@@ -3,8 +3,8 @@
 //! Bounds of designs divide the values of an attribute into *cells*: within a cell, each bound is either satisfied
 //! (kept) or violated (missed). A sample in the cell of the believed value is believed at once. A satisfied bound
 //! counts as violated as soon as a sample violates it. A violated bound counts as satisfied only after a sample that
-//! satisfies it by at least its band (a Schmitt trigger with the bound as one threshold \[1\]). A change of the cell
-//! (*crossing*) is debounced.
+//! satisfies it by at least its band (a Schmitt trigger with the bound as one threshold \[1\]). Crossings of bounds are
+//! debounced, each bound on its own.
 //!
 //! There is an exception if a lower bound of one design and an upper bound of another design are within one band of
 //! each other. Each crossing then makes one of the designs unavailable. So a sample changes the cell only if it lies
@@ -93,16 +93,24 @@ pub(crate) struct AttributeState {
     plausible: Option<BigRational>,
     /// Last sample rejected as a jump; `None` after a plausible sample.
     suspect: Option<BigRational>,
-    /// For each of the last samples, oldest first, whether the sample has crossed a bound relative to the believed
-    /// value.
-    recent: VecDeque<bool>,
-    /// Time since which all samples have crossed a bound, and the last of these samples; `None` without a crossing.
-    crossing: Option<(Micros, BigRational)>,
+    /// Last plausible samples since the last confirmed crossing, oldest first.
+    recent: VecDeque<BigRational>,
+    /// Crossings of the bounds, in their order; `None` for a bound that the last sample has not crossed.
+    crossings: Vec<Option<Crossing>>,
     last_sample_time: Option<Micros>,
     silent: bool,
     /// Number of samples held back. Set to 0 when a crossing of a bound is confirmed, when silence sets the believed
     /// value to the worst one, and by the first sample after a withdrawal.
     pub held: u64,
+}
+
+/// Latest samples without a gap that lie on the other side of a bound than the believed value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Crossing {
+    /// Time of the first of these samples.
+    since: Micros,
+    /// The one of these samples that is nearest to the believed value, after hysteresis.
+    nearest: BigRational,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -131,7 +139,7 @@ impl Hold {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Verdict {
     /// Newly believed value. The value differs from the sample if the sample satisfies some violated bounds by less
-    /// than their hysteresis.
+    /// than their hysteresis, or if it crosses further bounds than the confirmed ones.
     Accepted(BigRational),
     Held(Hold),
 }
@@ -172,27 +180,36 @@ impl AttributeFilter {
             state.believed = Some(value.clone());
             return Verdict::Accepted(value.clone());
         };
+        let target = self.target(believed, value).into_owned();
         // There is no value that could stay, so the first sample after a withdrawal is not held back.
         if is_withdrawn {
-            return self.accept(state, value);
+            return self.accept(state, target);
         }
-        let target = self.target(believed, value);
-        let crosses = !self.is_same_cell(believed, &target);
-        state.recent.push_back(crosses);
+        state.recent.push_back(value.clone());
         while state.recent.len() > self.of.max(self.agree).max(1) {
             state.recent.pop_front();
         }
-        if !crosses {
-            state.crossing = None;
-            if *target != *value {
+        state.crossings.resize(self.bounds.len(), None);
+        for (bound, crossing) in self.bounds.iter().zip(&mut state.crossings) {
+            *crossing = bound.is_crossed(believed, &target).then(|| match crossing.take() {
+                None => Crossing { since: now, nearest: target.clone() },
+                Some(Crossing { since, nearest }) => {
+                    let is_nearer = compare(&target, &nearest) == compare(believed, &nearest);
+                    Crossing { since, nearest: if is_nearer { target.clone() } else { nearest } }
+                }
+            });
+        }
+        if state.crossings.iter().all(Option::is_none) {
+            if target != *value {
                 return Verdict::Held(Hold::Hysteresis);
             }
-            state.believed = Some(value.clone());
-            return Verdict::Accepted(value.clone());
+            state.believed = Some(target.clone());
+            return Verdict::Accepted(target);
         }
-        let since = state.crossing.as_ref().map_or(now, |(since, _)| *since);
-        state.crossing = Some((since, value.clone()));
-        if self.is_confirmed(state, now) { self.accept(state, value) } else { Verdict::Held(Hold::Debounce) }
+        match self.confirmed(state, now) {
+            Some(target) => self.accept(state, target),
+            None => Verdict::Held(Hold::Debounce),
+        }
     }
 
     fn is_jump(&self, state: &AttributeState, value: &BigRational) -> bool {
@@ -204,29 +221,55 @@ impl AttributeFilter {
             && !state.suspect.as_ref().is_some_and(is_near)
     }
 
-    fn is_confirmed(&self, state: &AttributeState, now: Micros) -> bool {
-        let agreeing = state.recent.iter().filter(|crosses| **crosses).count();
-        let lasted =
-            state.crossing.as_ref().is_some_and(|(since, _)| now >= since.saturating_add(self.debounce));
-        lasted && agreeing >= self.agree
+    /// Returns the time from which the crossing of a bound is confirmed, unless another sample arrives. `None` if too few
+    /// samples agree.
+    fn confirmed_from(&self, state: &AttributeState, bound: &Bound, crossing: &Crossing) -> Option<Micros> {
+        let believed = state.believed.as_ref()?;
+        let has_crossed = |sample: &&BigRational| bound.is_crossed(believed, &self.target(believed, sample));
+        let is_agreed = self.agree <= 1 || state.recent.iter().filter(has_crossed).count() >= self.agree;
+        is_agreed.then(|| crossing.since.saturating_add(self.debounce))
     }
 
-    fn accept(&self, state: &mut AttributeState, value: &BigRational) -> Verdict {
-        let target = match &state.believed {
-            Some(current) => self.target(current, value).into_owned(),
-            None => value.clone(),
+    /// Returns the value to be believed if the crossing of a bound is confirmed at `now`: the latest sample that has
+    /// crossed all confirmed bounds and no others.
+    fn confirmed(&self, state: &AttributeState, now: Micros) -> Option<BigRational> {
+        let believed = state.believed.as_ref()?;
+        let mut confirmed = Vec::new();
+        let mut nearest = Vec::new();
+        for (bound, crossing) in self.bounds.iter().zip(&state.crossings) {
+            if let Some(crossing) = crossing
+                && self.confirmed_from(state, bound, crossing).is_some_and(|time| time <= now)
+            {
+                confirmed.push(bound);
+                nearest.push(crossing.nearest.clone());
+            }
+        }
+        if confirmed.is_empty() {
+            return None;
+        }
+        let latest = state.recent.iter().rev().map(|sample| self.target(believed, sample).into_owned());
+        let crosses_all =
+            |target: &BigRational| confirmed.iter().all(|bound| bound.is_crossed(believed, target));
+        // Nearer bounds are crossed whenever farther ones are, so that one of these samples has crossed no others.
+        let crossed_count = |target: &BigRational| {
+            self.bounds.iter().filter(|bound| bound.is_crossed(believed, target)).count()
         };
+        latest.chain(nearest).filter(crosses_all).min_by_key(crossed_count)
+    }
+
+    fn accept(&self, state: &mut AttributeState, target: BigRational) -> Verdict {
+        for (bound, crossing) in self.bounds.iter().zip(&mut state.crossings) {
+            crossing.take_if(|crossing| !bound.is_crossed(&target, &crossing.nearest));
+        }
         state.believed = Some(target.clone());
         state.recent.clear();
-        state.crossing = None;
         state.held = 0;
         Verdict::Accepted(target)
     }
 
     pub(crate) fn due(&self, state: &AttributeState) -> Option<Micros> {
         let silent = self.silent_at(state);
-        let confirmed = self.confirmed_from(state);
-        [silent, confirmed].into_iter().flatten().min()
+        [silent, self.crossing_due(state)].into_iter().flatten().min()
     }
 
     fn silent_at(&self, state: &AttributeState) -> Option<Micros> {
@@ -234,10 +277,10 @@ impl AttributeFilter {
         Some(state.last_sample_time.unwrap_or(0).saturating_add(period).saturating_add(1))
     }
 
-    fn confirmed_from(&self, state: &AttributeState) -> Option<Micros> {
-        let (since, _) = state.crossing.as_ref()?;
-        let confirmed = since.saturating_add(self.debounce);
-        self.is_confirmed(state, confirmed).then_some(confirmed)
+    /// Returns the earliest time at which the crossing of a bound is confirmed without another sample.
+    fn crossing_due(&self, state: &AttributeState) -> Option<Micros> {
+        let crossings = self.bounds.iter().zip(&state.crossings);
+        crossings.filter_map(|(bound, crossing)| self.confirmed_from(state, bound, crossing.as_ref()?)).min()
     }
 
     /// Starts to measure the sensor's silence at `now`, unless the measurement has started before or a sample has
@@ -249,14 +292,13 @@ impl AttributeFilter {
     /// Applies and returns the first change that is due at `now`. Must be called until the result is `None`.
     pub(crate) fn elapse(&self, state: &mut AttributeState, now: Micros) -> Option<Elapsed> {
         let due = self.due(state).filter(|due| *due <= now)?;
-        if self.confirmed_from(state) == Some(due) {
-            let (_, value) = state.crossing.clone()?;
-            let Verdict::Accepted(value) = self.accept(state, &value) else { return None };
+        if let Some(target) = self.confirmed(state, due) {
+            let Verdict::Accepted(value) = self.accept(state, target) else { return None };
             return Some(Elapsed::Accepted(value));
         }
         state.silent = true;
         // A crossing before the silence does not count after it.
-        state.crossing = None;
+        state.crossings.clear();
         state.recent.clear();
         let worst = if self.stale == Stale::Worst { self.worst() } else { None };
         if let Some(worst) = &worst {
@@ -304,8 +346,9 @@ impl AttributeFilter {
         }
     }
 
-    /// Returns a value that satisfies the fewest bounds, the lowest one if several do; `None` without bounds. A value
-    /// between two bounds must be plausible. A value beyond all bounds may lie outside of the plausible range.
+    /// Returns a value that satisfies the fewest bounds, the lowest one if several do; `None` without bounds.
+    /// Cells without a plausible value do not count. A value beyond all bounds may lie outside of the plausible
+    /// range, if another value of its cell does not.
     pub(crate) fn worst(&self) -> Option<BigRational> {
         let unit = BigRational::from_integer(1.into());
         let two = BigRational::from_integer(2.into());
@@ -313,13 +356,25 @@ impl AttributeFilter {
         values.sort();
         values.dedup();
         let (first, last) = (*values.first()?, *values.last()?);
-        let between = values.windows(2).map(|pair| (pair[0] + pair[1]) / &two);
-        let mut candidates: Vec<BigRational> = vec![first - &unit, last + &unit];
-        candidates.extend(between);
-        candidates.retain(|value| {
-            self.minimum.as_ref().is_none_or(|minimum| value >= minimum || value < first)
-                && self.maximum.as_ref().is_none_or(|maximum| value <= maximum || value > last)
-        });
+        // Only the plausible part of an interval between two bounds counts.
+        let plausible_part = |pair: &[&BigRational]| {
+            let low = self.minimum.as_ref().map_or(pair[0], |minimum| minimum.max(pair[0]));
+            let high = self.maximum.as_ref().map_or(pair[1], |maximum| maximum.min(pair[1]));
+            let middle = (low + high) / &two;
+            (low <= high && middle > *pair[0] && middle < *pair[1]).then_some(middle)
+        };
+        let mut candidates: Vec<BigRational> = values.windows(2).filter_map(plausible_part).collect();
+        if self.minimum.as_ref().is_none_or(|minimum| minimum < first) {
+            candidates.push(first - &unit);
+        }
+        if self.maximum.as_ref().is_none_or(|maximum| maximum > last) {
+            candidates.push(last + &unit);
+        }
+        let is_plausible = |value: &&BigRational| {
+            self.minimum.as_ref().is_none_or(|minimum| *value >= minimum)
+                && self.maximum.as_ref().is_none_or(|maximum| *value <= maximum)
+        };
+        candidates.extend(values.iter().copied().filter(is_plausible).cloned());
         candidates.sort();
         let kept_bounds = |value: &BigRational| self.bounds.iter().filter(|bound| bound.keeps(value)).count();
         candidates.into_iter().min_by_key(kept_bounds)
@@ -346,6 +401,11 @@ impl Bound {
         }
     }
 
+    /// Returns `true` if exactly one of two values satisfies the bound.
+    fn is_crossed(&self, believed: &BigRational, value: &BigRational) -> bool {
+        self.keeps(believed) != self.keeps(value)
+    }
+
     /// Returns `true` if a value satisfies the bound by at least its band (hysteresis).
     pub(crate) fn keeps_clearly(&self, value: &BigRational) -> bool {
         match self.side {
@@ -362,12 +422,15 @@ impl AttributeState {
 
     pub(crate) fn to_record(&self) -> Value {
         let text = |value: &Option<BigRational>| value.as_ref().map(ToString::to_string);
+        let crossing = |crossing: &Option<Crossing>| {
+            crossing.as_ref().map(|Crossing { since, nearest }| json!([since, nearest.to_string()]))
+        };
         json!([
             text(&self.believed),
             text(&self.plausible),
             text(&self.suspect),
-            self.recent,
-            self.crossing.as_ref().map(|(since, value)| json!([since, value.to_string()])),
+            self.recent.iter().map(ToString::to_string).collect::<Vec<_>>(),
+            self.crossings.iter().map(crossing).collect::<Vec<_>>(),
             self.last_sample_time,
             self.silent,
             self.held
@@ -375,7 +438,7 @@ impl AttributeState {
     }
 
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
-        let [believed, plausible, suspect, recent, crossing, last_sample_time, silent, held] =
+        let [believed, plausible, suspect, recent, crossings, last_sample_time, silent, held] =
             record.as_array()?.as_slice()
         else {
             return None;
@@ -383,15 +446,17 @@ impl AttributeState {
         let number = |value: &Value| -> Option<Option<BigRational>> {
             if value.is_null() { Some(None) } else { value.as_str()?.parse().ok().map(Some) }
         };
+        let sample = |value: &Value| value.as_str()?.parse().ok();
+        let crossing = |value: &Value| match value {
+            Value::Null => Some(None),
+            pair => Some(Some(Crossing { since: pair.get(0)?.as_u64()?, nearest: sample(pair.get(1)?)? })),
+        };
         Some(Self {
             believed: number(believed)?,
             plausible: number(plausible)?,
             suspect: number(suspect)?,
-            recent: recent.as_array()?.iter().map(Value::as_bool).collect::<Option<_>>()?,
-            crossing: match crossing {
-                Value::Null => None,
-                pair => Some((pair.get(0)?.as_u64()?, pair.get(1)?.as_str()?.parse().ok()?)),
-            },
+            recent: recent.as_array()?.iter().map(sample).collect::<Option<_>>()?,
+            crossings: crossings.as_array()?.iter().map(crossing).collect::<Option<_>>()?,
             last_sample_time: if last_sample_time.is_null() {
                 None
             } else {

@@ -125,47 +125,49 @@ fn a_bound_in_the_settings_has_the_direction_of_its_key() {
 /// Times, in the unit of the filter's times, with samples in thousandths; `None` for a tick.
 type History = Vec<(u64, Option<i64>)>;
 
-/// Value in thousandths that is believed at the end of a history, computed from the definition of debouncing. A sample
-/// on the believed side of the bound 500 counts at once. Another sample counts as soon as all samples of the last
-/// `debounce`, and at least `agree` of the last `of` samples, lie on the other side.
-fn believed(history: &History, debounce: u64, agree: usize, of: usize) -> i64 {
-    let is_high = |value: i64| value > 500;
-    let mut current = history.iter().find_map(|(_, sample)| *sample).expect("a sample");
+/// Value in thousandths that is believed at the end of a history, computed from the definition of debouncing for each
+/// bound on its own. A bound changes as soon as all samples of the last `debounce`, and at least `agree` of the last
+/// `of` samples since the last change, lie on its other side. Of the samples that lie in the cell with these changes,
+/// the latest one is believed.
+fn believed(history: &History, bounds: &[i64], debounce: u64, agree: usize, of: usize) -> i64 {
+    let samples: Vec<(u64, i64)> =
+        history.iter().filter_map(|(time, sample)| sample.map(|sample| (*time, sample))).collect();
+    let mut current = samples[0].1;
     let end = history.last().map_or(0, |(time, _)| *time);
-    // Samples before a change of the believed value do not count.
+    // Samples before a change of the believed value do not agree with later ones.
     let mut first_counted = 0;
     for now in 0..=end {
-        let times: Vec<u64> =
-            history.iter().filter(|(_, sample)| sample.is_some()).map(|(time, _)| *time).collect();
         // The debounce time of earlier samples may end now, before a sample at the same time counts.
         for inclusive in [false, true] {
-            let samples: Vec<(usize, u64, i64)> = history
+            let past: Vec<(u64, i64)> = samples
                 .iter()
-                .filter(|(_, sample)| sample.is_some())
-                .enumerate()
-                .filter(|(_, (time, _))| *time < now || (inclusive && *time == now))
-                .map(|(at, (time, sample))| (at, *time, sample.unwrap_or_default()))
-                .filter(|(at, ..)| *at >= first_counted)
+                .copied()
+                .filter(|(time, _)| *time < now || (inclusive && *time == now))
                 .collect();
-            let Some((last_at, _, last)) = samples.last().copied() else { continue };
-            if is_high(last) == is_high(current) {
-                current = last;
-                continue;
-            }
-            let run: Vec<_> = samples
+            let Some((_, last)) = past.last().copied() else { continue };
+            let crosses = |bound: i64, sample: i64| (sample > bound) != (current > bound);
+            let changed: Vec<i64> = bounds
                 .iter()
-                .rev()
-                .take_while(|(_, _, sample)| is_high(*sample) != is_high(current))
+                .copied()
+                .filter(|bound| {
+                    let run = past.iter().rev().take_while(|(_, sample)| crosses(*bound, *sample));
+                    let Some((since, _)) = run.last() else { return false };
+                    let counted = past.iter().skip(first_counted).rev().take(of.max(agree).max(1));
+                    let agreeing = counted.filter(|(_, sample)| crosses(*bound, *sample)).count();
+                    now - since >= debounce && (agree <= 1 || agreeing >= agree)
+                })
                 .collect();
-            let since = run.last().map_or(now, |(_, time, _)| *time);
-            let recent = samples.iter().rev().take(of.max(agree).max(1));
-            let agreeing = recent.filter(|(_, _, sample)| is_high(*sample) != is_high(current)).count();
-            if now - since >= debounce && agreeing >= agree {
+            if bounds.iter().all(|bound| !crosses(*bound, last)) {
                 current = last;
-                first_counted = last_at + 1;
+            } else if !changed.is_empty() {
+                let is_in_cell = |sample: &i64| {
+                    bounds.iter().all(|bound| crosses(*bound, *sample) == changed.contains(bound))
+                };
+                let latest = past.iter().rev().map(|(_, sample)| *sample).find(is_in_cell);
+                current = latest.expect("a sample that crosses the changed bounds only");
+                first_counted = past.len();
             }
         }
-        assert!(times.len() <= history.len());
     }
     current
 }
@@ -176,8 +178,9 @@ fn debounce_matches_its_definition_with_and_without_ticks() {
     for round in 0..3_000 {
         let (debounce, of) = (random.u64(0..6), random.usize(0..5));
         let agree = random.usize(0..=of);
+        let bounds = &[500, 700, 300][..random.usize(1..=3)];
         let filter = AttributeFilter {
-            bounds: vec![bound(500, Side::Most, 0)],
+            bounds: bounds.iter().map(|value| bound(*value, Side::Most, 0)).collect(),
             debounce,
             agree,
             of,
@@ -186,7 +189,7 @@ fn debounce_matches_its_definition_with_and_without_ticks() {
         let mut history: History = vec![(0, Some(400))];
         for _ in 0..random.usize(1..25) {
             let time = history[history.len() - 1].0 + random.u64(1..4);
-            history.push((time, Some(if random.bool() { 400 } else { 600 } + random.i64(0..50))));
+            history.push((time, Some(200 * random.i64(1..=4) + random.i64(0..50))));
         }
         let end = history[history.len() - 1].0 + 10;
         let mut results = Vec::new();
@@ -207,18 +210,48 @@ fn debounce_matches_its_definition_with_and_without_ticks() {
                         current = Some(value);
                     }
                 }
+                let record = state.to_record();
+                assert_eq!(AttributeState::from_record(&record).as_ref(), Some(&state), "{record}");
             }
             results.push(current.expect("the first sample is believed"));
             assert_eq!(filter.due(&state), None, "nothing is due at the end unless samples are missing");
         }
         let mut whole = history.clone();
         whole.push((end, None));
-        let expected = value(believed(&whole, debounce, agree, of));
+        let expected = value(believed(&whole, bounds, debounce, agree, of));
+        let in_cell =
+            |value: &BigRational| filter.bounds.iter().map(|bound| bound.keeps(value)).collect::<Vec<_>>();
         assert_eq!(
-            results,
-            [expected.clone(), expected],
-            "round {round}: {debounce} {agree}/{of} {history:?}"
+            results.iter().map(in_cell).collect::<Vec<_>>(),
+            [in_cell(&expected), in_cell(&expected)],
+            "round {round}: {bounds:?} {debounce} {agree}/{of} {history:?}"
         );
+        if bounds.len() == 1 {
+            assert_eq!(results, [expected.clone(), expected], "round {round}");
+        }
+    }
+}
+
+/// A single outlier crosses no further bound than the samples that confirm the crossing.
+#[test]
+fn outliers_do_not_cross_further_bounds() {
+    let bounds = [1250, 2250, 3250].map(|value| bound(value, Side::Least, 0)).to_vec();
+    let debounced = AttributeFilter { bounds: bounds.clone(), debounce: 50, ..AttributeFilter::default() };
+    let agreeing = AttributeFilter { bounds, agree: 4, of: 5, ..AttributeFilter::default() };
+    for filter in [debounced, agreeing] {
+        let mut state = AttributeState::believing(Some(value(3500)));
+        for (now, sample) in [(10, 3100), (20, 3100), (30, 3100)] {
+            assert_eq!(filter.sample(&mut state, now, &value(sample)), Verdict::Held(Hold::Debounce));
+        }
+        let verdict = filter.sample(&mut state, 59, &value(500));
+        let believed = match filter.elapse(&mut state, 60) {
+            Some(Elapsed::Accepted(believed)) => believed,
+            _ => match verdict {
+                Verdict::Accepted(believed) => believed,
+                Verdict::Held(hold) => panic!("{hold:?}"),
+            },
+        };
+        assert_eq!(believed, value(3100));
     }
 }
 
@@ -316,6 +349,12 @@ fn the_worst_value_keeps_the_fewest_bounds() {
         let kept_count = |value: &BigRational| bounds.iter().filter(|bound| bound.keeps(value)).count();
         let minimum = (-100..1500).map(|sample| kept_count(&value(sample))).min();
         assert_eq!(Some(kept_count(&worst)), minimum, "{bounds:?}");
+        // Only plausible values count.
+        let (low, high) = (random.i64(0..1200), random.i64(0..300));
+        let (minimum, maximum) = (Some(value(low)), Some(value(low + high)));
+        let worst = AttributeFilter { minimum, maximum, ..filter }.worst().expect("there are bounds");
+        let minimum = (low..=low + high).map(|sample| kept_count(&value(sample))).min();
+        assert_eq!(Some(kept_count(&worst)), minimum, "{bounds:?} {low} {high}");
     }
 }
 
