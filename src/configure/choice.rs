@@ -69,6 +69,9 @@ pub struct Choice {
     pub before: Option<String>,
     /// The chosen design, by local name; `None` if no design was chosen.
     pub design: Option<String>,
+    /// `true` if no design was chosen and the objective cannot keep its present design either: other objectives need
+    /// its components or its share of a budget.
+    pub withdrawn: bool,
     /// All designs of the function, the preferred ones first: fewest missed requirements, then greatest utility.
     pub considered: Vec<Considered>,
 }
@@ -196,7 +199,10 @@ pub(super) fn choose(
         kept: &fixed_offers,
         left: &remaining,
     };
-    let choices = (0..needing.len()).map(|at| whole.choice(at)).collect();
+    let withdrawn = whole.withdrawn();
+    let choices = (0..needing.len())
+        .map(|at| Choice { withdrawn: withdrawn.contains(&at), ..whole.choice(at) })
+        .collect();
     Ok(Configuration { choices, utility: chosen.utility, optimal: chosen.optimal })
 }
 
@@ -284,6 +290,7 @@ impl Whole<'_> {
             need: need(group),
             before: group.current().map(ToOwned::to_owned),
             design: self.designs[at].map(|position| group.candidates[position].design.clone()),
+            withdrawn: false,
             considered: considered.collect(),
         }
     }
@@ -301,15 +308,36 @@ impl Whole<'_> {
         if self.designs[at].is_some_and(|chosen| chosen < position) {
             return Verdict::Less;
         }
-        Verdict::Together(self.conflict(at, offer))
+        let conflict = self.conflict(at, offer, &[]);
+        // Without a conflict, the best choice would have this design.
+        let limit = || "a limit was reached before a choice with this design was found".to_owned();
+        Verdict::Together(conflict.unwrap_or_else(limit))
     }
 
-    fn conflict(&self, at: usize, offer: &Offer) -> String {
+    /// Returns the objectives without a choice whose present designs conflict with the other designs in use.
+    fn withdrawn(&self) -> BTreeSet<usize> {
+        let (mut withdrawn, mut unserved) = (BTreeSet::new(), Vec::new());
+        for (at, group) in self.needing.iter().enumerate().filter(|(at, _)| self.designs[*at].is_none()) {
+            let current =
+                group.candidates.iter().find(|offer| Some(offer.design.as_str()) == group.current());
+            let Some(current) = current else { continue };
+            if self.conflict(at, current, &unserved).is_some() {
+                withdrawn.insert(at);
+            } else {
+                unserved.push(current);
+            }
+        }
+        withdrawn
+    }
+
+    /// Returns the reason why an objective cannot have a design beside the chosen designs of the others, those that
+    /// stay, and `unserved`, the present designs of other objectives without a choice.
+    fn conflict(&self, at: usize, offer: &Offer, unserved: &[&Offer]) -> Option<String> {
         let chosen_elsewhere =
             self.needing.iter().zip(self.designs).enumerate().filter(|(other, _)| *other != at);
         let chosen = chosen_elsewhere
             .filter_map(|(_, (group, design))| design.map(|design| &group.candidates[design]));
-        let chosen_elsewhere: Vec<&Offer> = chosen.collect();
+        let chosen_elsewhere: Vec<&Offer> = chosen.chain(unserved.iter().copied()).collect();
         for other in self.kept.iter().chain(&chosen_elsewhere) {
             if let Some(component) = self
                 .wishes
@@ -317,7 +345,7 @@ impl Whole<'_> {
                 .iter()
                 .find(|component| [*other, offer].iter().all(|own| own.components.contains(component)))
             {
-                return format!("{} uses {component}, which only one design can use", other.design);
+                return Some(format!("{} uses {component}, which only one design can use", other.design));
             }
         }
         for (budget, (attribute, most)) in self.wishes.budgets.iter().enumerate() {
@@ -325,15 +353,14 @@ impl Whole<'_> {
             let sum = chosen_elsewhere.iter().map(|other| demand(other)).sum::<BigRational>() + demand(offer);
             if sum > self.left[budget] {
                 let whole = sum + self.kept.iter().map(|other| demand(other)).sum::<BigRational>();
-                return format!(
+                return Some(format!(
                     "{attribute} would be {} in total; the budget is {}",
                     decimal(&whole),
                     decimal(most)
-                );
+                ));
             }
         }
-        // Without a conflict, the best choice would have this design.
-        "a limit was reached before a choice with this design was found".to_owned()
+        None
     }
 
     fn reasons(&self, design: &str, rejection: &Rejection) -> Vec<String> {

@@ -160,7 +160,7 @@ impl Configurator {
     /// Grounds the objective by the chosen design, i.e. makes it the design of the objective. The objective's statuses
     /// are retracted; if it was updatable, so are the reports of recovered components. Recorded failures of designs are
     /// kept. If the design changes, measurements of the previous design's performance no longer count. An objective
-    /// without a chosen design keeps its design and stays in need.
+    /// without a chosen design stays in need, and keeps its design unless it is [withdrawn](Choice::withdrawn).
     ///
     /// # Errors
     /// The objective or the design does not exist, or the rules do not terminate.
@@ -168,7 +168,11 @@ impl Configurator {
         let objective = choice.objective.as_str();
         let Some(design) = &choice.design else {
             self.pending.insert(objective.to_owned());
-            return Ok(());
+            return if choice.withdrawn {
+                self.change(|runtime| runtime.unground(objective))
+            } else {
+                Ok(())
+            };
         };
         self.change(|runtime| {
             runtime.log_failures(objective)?;

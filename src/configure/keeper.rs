@@ -42,7 +42,7 @@ pub enum Service {
         function: Option<String>,
         /// The previous design, if there was one.
         from: Option<String>,
-        /// The new design. `None` if the objective was removed.
+        /// The new design. `None` if the objective was removed, or has to give up its design for other objectives.
         to: Option<String>,
         /// Reasons, as sentences: why the objective needs a design, why better designs were not chosen, and which
         /// requirements the new design misses. If the objective was removed, the only reason is the removal.
@@ -57,7 +57,7 @@ pub enum Service {
         repeated: bool,
     },
     /// No design was chosen for the objective, usually because none can serve it now. The objective keeps its design,
-    /// if any.
+    /// if any, unless a line before requests to give it up.
     #[serde(rename = "unserved")]
     Unserved {
         /// The objective.
@@ -245,6 +245,13 @@ impl Keeper {
         let knowledge = self.configurator.knowledge_mut();
         match event {
             Event::Measured { attribute, value } => {
+                // A refused line must not change the state of a filter.
+                if !knowledge.has_attribute(attribute) {
+                    return knowledge
+                        .take(attribute, RobotReport::measured(value))
+                        .map(|_| ())
+                        .map_err(refused);
+                }
                 let mut filter_answers = Vec::new();
                 let value =
                     self.filters.sample(&mut self.states, self.now, attribute, value, &mut filter_answers);
@@ -348,18 +355,9 @@ impl Keeper {
         if let Some(objective) = objective_by_name
             && let Some(design) = current(objective)
         {
-            self.effects += 1;
-            let reconfigure = Service::Reconfigure {
-                objective: objective.individual.name.clone(),
-                function: objective.function.as_ref().map(|function| function.name.clone()),
-                from: Some(design.to_owned()),
-                to: None,
-                because: vec!["the objective was removed".to_owned()],
-                optimal: true,
-                effect: self.effects,
-                repeated: false,
-            };
-            answers.push(self.request(&objective.individual.name, reconfigure));
+            let function = objective.function.as_ref().map(|function| function.name.clone());
+            let because = vec!["the objective was removed".to_owned()];
+            answers.push(self.withdraw(&objective.individual.name, function, design, (because, true)));
         }
         // A failed change of a removed objective needs no undo. Changes are recorded under the name, and events may have
         // the IRI.
@@ -367,6 +365,30 @@ impl Keeper {
         self.pending_changes.retain(|_, pending_changes| pending_changes.objective != name);
         self.unserved.remove(name);
         Ok(())
+    }
+
+    /// Requests that the robot gives up the design of an objective.
+    fn withdraw(
+        &mut self,
+        objective: &str,
+        function: Option<String>,
+        design: &str,
+        (because, optimal): (Vec<String>, bool),
+    ) -> KeeperAnswer {
+        self.effects += 1;
+        // A failure of an earlier change must not bring the design before it back.
+        self.pending_changes.retain(|_, change| change.objective != objective);
+        let reconfigure = Service::Reconfigure {
+            objective: objective.to_owned(),
+            function,
+            from: Some(design.to_owned()),
+            to: None,
+            because,
+            optimal,
+            effect: self.effects,
+            repeated: false,
+        };
+        self.request(objective, reconfigure)
     }
 
     /// Reports new conclusions, then requests designs for the objectives in need, unless reasoning itself failed.
@@ -384,7 +406,9 @@ impl Keeper {
         let limits = self.limit.map_or_else(Limits::none, |time| Limits::none().with_time(time));
         match self.configurator.choose(&limits) {
             Err(message) => answers.push(wrong(&message)),
-            Ok(configuration) => {
+            Ok(mut configuration) => {
+                // Components are released before others use them.
+                configuration.choices.sort_by_key(|choice| !choice.withdrawn);
                 for choice in configuration.choices {
                     self.adopt(&choice, configuration.optimal, answers);
                 }
@@ -401,6 +425,12 @@ impl Keeper {
         }
         let Some(design) = &choice.design else {
             let because = reasons_of(choice);
+            if choice.withdrawn
+                && let Some(design) = &choice.before
+            {
+                let reasons = (because.clone(), optimal);
+                answers.push(self.withdraw(&objective, function.clone(), design, reasons));
+            }
             // Unchanged reasons are not reported again.
             if self.unserved.get(&objective) != Some(&because) {
                 self.unserved.insert(objective.clone(), because.clone());

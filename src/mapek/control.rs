@@ -112,9 +112,14 @@ impl Loop {
     /// Creates the loop of a mission.
     ///
     /// # Errors
-    /// The filled problem does not fit the domain, or the knowledge is inconsistent.
+    /// The filled problem does not fit the domain, the mission [depends on its past](Mission::depends_on_past), or the
+    /// knowledge is inconsistent.
     pub fn new(mission: Mission, settings: Settings) -> Result<Self, Errors> {
         mission.filled()?;
+        let unsupported = mission.depends_on_past();
+        if !unsupported.is_empty() {
+            return Err(unsupported.into());
+        }
         let contradictions = mission.knowledge().map(Knowledge::contradictions).unwrap_or_default();
         if let Some(first) = contradictions.first() {
             let text =

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use metaplan::configure::{Configurator, Goal, Keeper, KeeperAnswer, Service, Wishes, Worth};
 use metaplan::knowledge::{Knowledge, RobotReport, Sources};
-use metaplan::mapek::{Answer, Observation};
+use metaplan::mapek::{Answer, FilterSettings, Observation};
 use num_rational::BigRational;
 use ontology::ReadOptions;
 use ontology::tomasys::change::Status;
@@ -276,6 +276,61 @@ fn a_failed_design_is_replaced_and_requested_again_once_realisable() {
     let answers = deliver(&mut keeper, r#"{"event":"objective_removed","objective":"o1"}"#);
     assert_eq!(reconfigurations(&answers), [("o1", Some("fd_look_close"), None)]);
     assert_eq!(deliver(&mut keeper, r#"{"event":"acknowledged","effect":6}"#), []);
+}
+
+/// An objective without a choice gives up its design if another objective needs the component.
+#[test]
+fn a_design_that_cannot_be_kept_is_withdrawn() {
+    let wishes = Wishes { exclusive: BTreeSet::from(["c_arm".to_owned()]), ..Wishes::default() };
+    let mut keeper = Keeper::new(Configurator::new(robot(), wishes).expect("known names"), None);
+    keeper.start();
+    let design = |name: &str, realisable: bool| {
+        format!(r#"{{"event":"design_status","design":"{name}","realisable":{realisable}}}"#)
+    };
+    deliver(&mut keeper, r#"{"event":"objective_added","objective":"o1","function":"f_look"}"#);
+    deliver(&mut keeper, r#"{"event":"objective_added","objective":"o2","function":"f_grasp"}"#);
+    for unavailable in ["fd_look_far", "fd_look_close"] {
+        assert_eq!(reconfigurations(&deliver(&mut keeper, &design(unavailable, false))), []);
+    }
+    let answers = deliver(&mut keeper, &design("fd_push", false));
+    let (close, firm) = (Some("fd_look_close"), Some("fd_grasp_firm"));
+    assert_eq!(
+        reconfigurations(&answers),
+        [("o1", close, None), ("o2", Some("fd_push"), firm)],
+        "{answers:?}"
+    );
+    // The arm is in use, so the design does not come back; another design of the other objective releases the arm.
+    assert_eq!(reconfigurations(&deliver(&mut keeper, &design("fd_look_close", true))), []);
+    deliver(&mut keeper, &design("fd_push", true));
+    let answers = deliver(&mut keeper, &design("fd_grasp_firm", false));
+    assert_eq!(
+        reconfigurations(&answers),
+        [("o1", None, close), ("o2", firm, Some("fd_push"))],
+        "{answers:?}"
+    );
+}
+
+/// A filter is not changed by a refused measurement.
+#[test]
+fn a_refused_measurement_does_not_change_its_filter() {
+    let knowledge = Knowledge::read(&Sources {
+        documents: vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("ontology/kb/ugv.ttl")],
+        rules: vec!["coadaptation".to_owned()],
+        ..Sources::default()
+    });
+    let configurator = Configurator::new(knowledge.expect("readable"), Wishes::default()).expect("no wishes");
+    let mut keeper = Keeper::new(configurator, None).with_filters(&FilterSettings::default());
+    keeper.start();
+    let measured = |attribute: &str, value: &str| {
+        format!(r#"{{"event":"measured","attribute":"{attribute}","value":{value}}}"#)
+    };
+    let available = |answers: &[KeeperAnswer]| format!("{answers:?}").contains("fd_amcl_kinect");
+    assert!(available(&deliver(&mut keeper, &measured("ambient_light", "0.9"))));
+    let refused = deliver(&mut keeper, &measured("http://example.org/wrong#ambient_light", "0.3"));
+    assert!(format!("{refused:?}").contains("M306"), "{refused:?}");
+    // Within the band of the bound 0.8.
+    let answers = deliver(&mut keeper, &measured("ambient_light", "0.79"));
+    assert!(!available(&answers), "{answers:?}");
 }
 
 /// A rule of the user and an event can make a design unavailable without an error of its objective.

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::common::{metaplan_in, root};
+use crate::common::{headlines, metaplan_in, root};
 
 /// Runs the loop on input lines and compares the line number and the kind of each answer with `expected`.
 /// Line 0 is the start. Returns the answers.
@@ -120,6 +120,36 @@ fn events_can_come_from_files_and_missions_from_pddl() {
             "1 handled",
         ],
     );
+}
+
+/// The loop plans from the present state, so it refuses what depends on earlier states or on the clock.
+#[test]
+fn missions_that_depend_on_their_past_are_refused() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let domain =
+        "(define (domain d) (:requirements :strips :constraints :preferences :timed-initial-literals)
+(:predicates (a) (b)) (:action go :parameters () :precondition () :effect (and (a) (b))))";
+    std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
+    let run = |init: &str, goal: &str, constraints: &str| {
+        let problem = format!(
+            "(define (problem p) (:domain d)\n(:init {init})\n(:goal {goal})\n(:constraints (and\n{constraints})))"
+        );
+        std::fs::write(directory.path().join("p.pddl"), problem).expect("a file");
+        metaplan_in(directory.path(), &["run", "d.pddl", "p.pddl"], "")
+    };
+    let outcome = run("", "(and (a) (preference g (b)))", "(always (or (a) (not (b))))\n(at end (b))");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    assert!(outcome.stdout.contains("plan_found"), "{outcome:#?}");
+    let outcome = run(
+        "(at 5 (a))",
+        "(a)",
+        "(sometime (b))\n(always (not (a)))\n(preference p (always (not (a))))\n(at-most-once (b))",
+    );
+    assert_eq!(outcome.status, 3, "{outcome:#?}");
+    let lines: Vec<String> = headlines(&outcome.stderr).lines().map(ToOwned::to_owned).collect();
+    let places = ["5:1", "7:1", "8:1", "2:8"].map(|place| format!("p.pddl:{place}: error[M310]"));
+    assert_eq!(lines.len(), places.len(), "{outcome:#?}");
+    assert!(lines.iter().zip(&places).all(|(line, place)| line.starts_with(place)), "{lines:#?}");
 }
 
 /// Runs the loop on one input line. Returns the code and the message of the error, or `None` if the line is accepted.

@@ -206,4 +206,10 @@ pub const CODES: &[[&str; 4]] = &[
         "`[bindings]` binds it to `chosen:ATTRIBUTE` or `reconfigured:ATTRIBUTE`, and the problem gives it a value.",
         "Remove the binding if the function is a variable of the problem, and otherwise the value.",
     ],
+    [
+        "M310",
+        "The adaptation loop does not support a part of the mission.",
+        "A timed initial literal, or a constraint or preference over the whole trajectory, refers to the past of the mission.",
+        "Use `plan`, or remove it. Report changes that are known in advance as facts when they happen.",
+    ],
 ];

@@ -13,6 +13,7 @@ mod called;
 mod codes;
 mod doubts;
 pub mod file;
+mod history;
 mod joined;
 pub mod knowledge;
 mod live;

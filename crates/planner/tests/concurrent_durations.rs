@@ -249,6 +249,32 @@ fn more_than_a_number_is_a_little_more() {
 }
 
 /// The planner does not consider durations below the separation and claims nothing about such plans.
+/// The search for chosen durations does not count violated preferences, so they are refused instead of ignored.
+#[test]
+fn preferences_with_durations_in_effects_are_refused() {
+    let domain =
+        "(define (domain d) (:requirements :fluents :durative-actions :duration-inequalities :preferences)
+      (:predicates (p) (g)) (:functions (n))
+      (:durative-action a :parameters () :duration (and (>= ?duration 1) (<= ?duration 3))
+        :condition (at start (p)) :effect (at end (and (g) (decrease (n) ?duration)))))";
+    let separation = rational(1, 1000);
+    for (goal, constraints, is_refused) in [
+        ("(and (g) (preference w (not (p))))", "", true),
+        ("(g)", "(:constraints (preference w (sometime (not (p)))))", true),
+        ("(g)", "(:constraints (preference w (within 1 (g))))", true),
+        ("(g)", "(:constraints (sometime (not (g))))", false),
+    ] {
+        let metric = if is_refused { "(+ (total-time) (is-violated w))" } else { "(total-time)" };
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init (p) (= (n) 0)) (:goal {goal}) {constraints}
+              (:metric minimize {metric}))"
+        );
+        let (domain, problem) = parse(domain, &problem);
+        let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation);
+        assert_eq!(task.is_err(), is_refused, "{goal} {constraints}: {:?}", task.err());
+    }
+}
+
 #[test]
 fn no_action_is_shorter_than_the_separation() {
     for (bounds, status) in [

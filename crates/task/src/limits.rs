@@ -67,12 +67,13 @@ impl Limits {
     }
 
     /// Returns limits for completing an answer after the deadline. The new deadline is later by a tenth of
-    /// the time limit and a constant grace period. If the limits have no deadline, the new limits have no
-    /// deadline, either. The interrupt flag is new, and the memory limit and thresholds are the defaults.
+    /// the time limit and a constant grace period than the present deadline, or than now if this deadline has passed: it
+    /// takes a while to free the memory of a search. If the limits have no deadline, the new limits have no deadline,
+    /// either. The interrupt flag is new, and the memory limit and thresholds are the defaults.
     #[must_use]
     pub fn extended(&self) -> Self {
         let grace = self.time.mul_f64(0.1).saturating_add(GRACE);
-        let deadline = self.deadline.and_then(|deadline| deadline.checked_add(grace));
+        let deadline = self.deadline.and_then(|deadline| deadline.max(Instant::now()).checked_add(grace));
         Self { deadline, time: self.time, ..Self::default() }
     }
 

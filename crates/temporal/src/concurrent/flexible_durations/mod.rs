@@ -40,15 +40,17 @@ use search::{Outcome, Search};
 /// Checks that the chosen durations of a task are supported.
 ///
 /// # Errors
-/// Fails if a derived predicate compares numbers, because its truth would depend on durations.
+/// Fails if a derived predicate compares numbers, because its truth would depend on durations. Conditional
+/// effects and constraints that compare numbers are compiled to such predicates.
 pub(super) fn check(concurrent: &TemporalTask) -> Result<(), Errors> {
     let mut rules = concurrent.task.axioms.iter().flat_map(|layer| &layer.rules);
     if rules.all(|rule| rule.body.linears().next().is_none()) {
         return Ok(());
     }
     Err(vec![Error::Unsupported {
-        construct: "a derived predicate over numbers, where durations are chosen".into(),
-        instead: "the comparison itself, or durations that are fixed".into(),
+        construct: "a derived predicate, conditional effect or constraint that compares numbers, where durations are chosen"
+            .into(),
+        instead: "durations that are fixed".into(),
         place: task::error::Place { file: task::error::File::Domain, span: pddl::ast::Span::default() },
     }]
     .into())
@@ -91,7 +93,12 @@ pub(super) fn optimize(concurrent: &TemporalTask, limits: &Limits, mut record: R
     let (is_over, lower, best) = span.in_scope(|| take_turns_choosing(concurrent, limits, &mut record));
     // Rounding durations to decimals may increase the metric slightly; then the value exceeds the
     // bound.
-    let is_proved = is_over && concurrent.is_exact && best.as_ref().is_none_or(|best| lower >= best.value);
+    let is_proved = concurrent.is_exact
+        && match &best {
+            // The bound alone proves the plan optimal, too, if it is a bound on the whole metric.
+            Some(best) => lower >= best.value && (is_over || concurrent.is_whole),
+            None => is_over,
+        };
     let status = match (&best, is_proved) {
         (Some(_), true) => Status::Optimal,
         (Some(_), false) => Status::Feasible,
