@@ -10,8 +10,8 @@ From Proved Require Import Task Check Proof Sound Derived Lifted Timed Faithful 
 Import ListNotations.
 Open Scope Q_scope.
 
-(* Need not be believed. Times of events and durations are multiples of 1/unit. *)
-Record timeline := Timeline { unit : positive; phase_atoms : list atom; waited : atom; clock : atom }.
+(* Need not be believed. Times of events and durations are multiples of 1/grid. *)
+Record timeline := Timeline { grid : positive; phase_atoms : list atom; waited : atom; clock : atom }.
 (* The numbers of events before and up to the start, and before and up to the end of an action *)
 Definition passage := (nat * nat * nat * nat)%type.
 Definition is_present {X} (o : option X) : bool := match o with Some _ => true | None => false end.
@@ -20,8 +20,8 @@ Section Check.
 Variables (P : problem) (events : list event) (T : task) (N : names) (X : timeline).
 Variables (case : nat -> list key -> passage -> case_tree) (wait_case : nat -> case_tree) (goal_case : case_tree).
 
-Definition on_grid (q : Q) : bool := Pos.eqb (Qden (Qred (q * (Zpos (unit X) # 1)))) 1.
-Definition moment : Q := 1 # unit X.
+Definition on_grid (q : Q) : bool := Pos.eqb (Qden (Qred (q * (Zpos (grid X) # 1)))) 1.
+Definition moment : Q := 1 # grid X.
 Definition phase (i : nat) : atom := nth i (phase_atoms X) (waited X).
 Definition up_to (t : Q) : nat := length (filter (fun v => Qle_bool (time v) t) events).
 Definition before (t : Q) : nat := length (filter (fun v => less (time v) t) events).
@@ -64,8 +64,10 @@ Definition feasible (g : passage) (d : Q) : bool :=
   forallb (fun l : Q * bool => forallb (fun u : Q * bool =>
     if snd l || snd u then less (fst l) (fst u) else Qle_bool (fst l) (fst u)) (upper g d)) (lower g d).
 Definition passages : list passage :=
-  let ns := seq 0 (S (length events)) in
-  flat_map (fun a => flat_map (fun b => flat_map (fun c => map (fun e => (a, b, c, e)) [c; S c]) (seq a (S (length events) - a))) [a; S a]) ns.
+  let n := length events in
+  let from a := seq a (S n - a) in                   (* a to n *)
+  let next a := filter (fun b => Nat.leb b n) [a; S a] in
+  flat_map (fun a => flat_map (fun b => flat_map (fun c => map (fun e => (a, b, c, e)) (next c)) (from a)) (next a)) (from 0%nat).
 
 (* Symbolic evaluation *)
 Definition put_sets (s : symbolic) (v : event) : symbolic := Symbolic (sets v ++ new_truths s) (new_values s) (stale s).

@@ -256,12 +256,12 @@ Lemma moment_positive : 0 < moment X.
 Proof. reflexivity. Qed.
 Lemma grid_ok : forall q, on_grid X q = true -> gridded q.
 Proof.
-  intros q H. unfold on_grid in H. apply Pos.eqb_eq in H. set (r := Qred (q * (Zpos (unit X) # 1))) in *.
-  assert (Er : r == q * (Zpos (unit X) # 1)) by apply Qred_correct.
+  intros q H. unfold on_grid in H. apply Pos.eqb_eq in H. set (r := Qred (q * (Zpos (grid X) # 1))) in *.
+  assert (Er : r == q * (Zpos (grid X) # 1)) by apply Qred_correct.
   assert (Ir : inject_Z (Qnum r) == r) by (unfold inject_Z; destruct r as [n d]; simpl in *; subst d; reflexivity).
-  exists (Qnum r). rewrite Ir, Er. unfold moment. setoid_replace (q * (Zpos (unit X) # 1) * (1 # unit X)) with
-    (q * ((Zpos (unit X) # 1) * (1 # unit X))) by ring.
-  setoid_replace ((Zpos (unit X) # 1) * (1 # unit X)) with 1; [ring|]. unfold Qeq. simpl. lia.
+  exists (Qnum r). rewrite Ir, Er. unfold moment. setoid_replace (q * (Zpos (grid X) # 1) * (1 # grid X)) with
+    (q * ((Zpos (grid X) # 1) * (1 # grid X))) by ring.
+  setoid_replace ((Zpos (grid X) # 1) * (1 # grid X)) with 1; [ring|]. unfold Qeq. simpl. lia.
 Qed.
 Lemma gridded_minus : forall a b, gridded a -> gridded b -> gridded (a - b).
 Proof. intros a b [x A] [y B]. exists (x - y)%Z. rewrite A, B. unfold Z.sub. rewrite inject_Z_plus, inject_Z_opp. ring. Qed.
@@ -368,15 +368,18 @@ Proof.
 Qed.
 Lemma in_passages : forall s d, 0 <= d -> In (passage_of s d) (passages events).
 Proof.
-  intros s d Z. unfold passages, passage_of. apply in_flat_map. exists (before s).
-  split; [apply in_seq; pose proof (before_length s); lia|]. apply in_flat_map. exists (up_to s).
-  split; [destruct (up_to_before s) as [->| ->]; [left|right; left]; reflexivity|]. apply in_flat_map. exists (before (s + d)).
+  intros s d Z. unfold passages, passage_of. cbv zeta.
   assert (M : (before s <= before (s + d))%nat).
   { unfold Timeline.before. generalize events as l. induction l as [|v l IH]; [reflexivity|]. cbn [filter].
     destruct (less (time v) s) eqn:A, (less (time v) (s + d)) eqn:B; cbn [length]; try lia. exfalso.
     apply less_spec in A. apply less_false in B. lra. }
-  split; [apply in_seq; pose proof (before_length (s + d)); lia|]. apply in_map_iff. exists (up_to (s + d)).
-  split; [reflexivity|]. destruct (up_to_before (s + d)) as [->| ->]; [left|right; left]; reflexivity.
+  assert (Nx : forall t, In (up_to t) (filter (fun b => Nat.leb b (length events)) [before t; S (before t)])).
+  { intro t. apply filter_In. split; [destruct (up_to_before t) as [->| ->]; [left|right; left]; reflexivity|].
+    apply Nat.leb_le, up_to_length. }
+  apply in_flat_map. exists (before s). split; [apply in_seq; pose proof (before_length s); lia|].
+  apply in_flat_map. exists (up_to s). split; [apply Nx|].
+  apply in_flat_map. exists (before (s + d)). split; [apply in_seq; pose proof (before_length (s + d)); lia|].
+  apply in_map, Nx.
 Qed.
 
 (* The worlds and states that belong together after [i] events at time [t] *)
