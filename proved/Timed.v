@@ -33,14 +33,11 @@ Fixpoint atoms_read_by_effect (env : list key) (e : effect) : list atom :=
   | Each t a => flat_map (fun o => atoms_read_by_effect (env ++ [o]) a) (objects P t)
   | _ => []
   end.
-(* Changes of an atom to a value; of an atom that is both added and deleted, the addition counts. *)
-Definition changes_to (cs : list change) (a : atom) (b : bool) : bool :=
-  sets_atom cs a b && (b || negb (sets_atom cs a true)).
 (* An event at time [t] sets an atom that the happening reads or changes to the other value. *)
 Definition interferes (w : world) (d : option Q) (env : list key) (f : formula) (e : effect) (t : Q) : bool :=
   existsb (fun l : atom * bool =>
       existsb (atom_eqb (fst l)) (atoms_read env f ++ atoms_read_by_effect env e) ||
-      match changes P w d env e with Some cs => changes_to cs (fst l) (negb (snd l)) | None => false end)
+      match changes P w d env e with Some cs => sets_atom cs (fst l) (negb (snd l)) | None => false end)
     (flat_map sets (at_time t)).
 (* The world after events, before each of which a condition holds. *)
 Fixpoint pass (w : world) (d : option Q) (env : list key) (f : formula) (vs : list event) : option world :=

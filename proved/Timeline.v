@@ -72,13 +72,11 @@ Definition passages : list passage :=
 (* Symbolic evaluation *)
 Definition put_sets (s : symbolic) (v : event) : symbolic := Symbolic (sets v ++ new_truths s) (new_values s) (stale s).
 Definition slice (i j : nat) : list event := skipn i (firstn j events).
-Definition symbolic_changes_to (ss : list symbolic_change) (a : atom) (b : bool) : bool :=
-  is_present (assoc a (atoms_set_to ss b)) && (b || negb (is_present (assoc a (atoms_set_to ss true)))).
 Definition surely_interferes (k : knowledge) (s : symbolic) (d : result) (env : list key) (f : formula) (e : effect) (vs : list event) : bool :=
   existsb (fun l : atom * bool =>
       existsb (atom_eqb (fst l)) (atoms_read P env f ++ atoms_read_by_effect P env e) ||
       match symbolic_changes extended T N k s d env e with
-      | Some ss => symbolic_changes_to ss (fst l) (negb (snd l)) | None => false end)
+      | Some ss => is_present (assoc (fst l) (atoms_set_to ss (negb (snd l)))) | None => false end)
     (flat_map sets vs).
 Fixpoint symbolic_pass (k : knowledge) (s : symbolic) (d : result) (env : list key) (f : formula) (vs : list event) : option symbolic :=
   match vs with

@@ -628,8 +628,7 @@ Proof.
   destruct (symbolic_changes E T N k sy r env e) as [ss|] eqn:Sc; [|discriminate].
   rewrite <- (changes_agrees w1 W1 Sm d e env F) in Cs.
   pose proof (symbolic_changes_ok E T N W0 k knows_base knows_values K W1 sy d r D A e env cs ss Cs Sc) as Fm.
-  unfold symbolic_changes_to in Si. unfold changes_to. rewrite !(truths_ok _ _ _ _ _ Fm) in Si.
-  destruct (sets_atom cs a (negb b)); [|discriminate]. destruct (sets_atom cs a true); exact Si.
+  rewrite (truths_ok _ _ _ _ _ Fm) in Si. destruct (sets_atom cs a (negb b)); [reflexivity|discriminate].
 Qed.
 Lemma pass_ok : forall vs, (forall v, In v vs -> In v events) -> forall w1 W1 sy d r env f w2, DescribesIn E W0 W1 sy -> agrees W0 d r ->
   same w1 W1 -> formula_free X f = true -> pass P w1 d env f vs = Some w2 ->

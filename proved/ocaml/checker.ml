@@ -4264,11 +4264,6 @@ let rec atoms_read_by_effect p env = function
     (p.objects t0)
 | _ -> []
 
-(** val changes_to : change list -> atom -> bool -> bool **)
-
-let changes_to cs a b =
-  (&&) (sets_atom cs a b) ((||) b (negb (sets_atom cs a true)))
-
 (** val interferes :
     problem -> event list -> world -> q option -> key1 list -> formula ->
     effect -> q -> bool **)
@@ -4279,7 +4274,7 @@ let interferes p events w d env f e t0 =
       (existsb (atom_eqb (fst l))
         (app (atoms_read p env f) (atoms_read_by_effect p env e)))
       (match changes p w d env e with
-       | Some cs -> changes_to cs (fst l) (negb (snd l))
+       | Some cs -> sets_atom cs (fst l) (negb (snd l))
        | None -> false)) (flat_map (fun e0 -> e0.sets) (at_time events t0))
 
 (** val pass :
@@ -4526,12 +4521,6 @@ let put_sets s v =
 let slice events i j =
   skipn i (firstn j events)
 
-(** val symbolic_changes_to : symbolic_change list -> atom -> bool -> bool **)
-
-let symbolic_changes_to ss a b =
-  (&&) (is_present (assoc a (atoms_set_to ss b)))
-    ((||) b (negb (is_present (assoc a (atoms_set_to ss true)))))
-
 (** val surely_interferes :
     problem -> event list -> task -> names -> timeline -> knowledge ->
     symbolic -> result -> key1 list -> formula -> effect -> event list -> bool **)
@@ -4542,7 +4531,8 @@ let surely_interferes p events t0 n x k s d env f e vs =
       (existsb (atom_eqb (fst l))
         (app (atoms_read p env f) (atoms_read_by_effect p env e)))
       (match symbolic_changes (extended p events x) t0 n k s d env e with
-       | Some ss -> symbolic_changes_to ss (fst l) (negb (snd l))
+       | Some ss ->
+         is_present (assoc (fst l) (atoms_set_to ss (negb (snd l))))
        | None -> false)) (flat_map (fun e0 -> e0.sets) vs)
 
 (** val symbolic_pass :

@@ -1178,8 +1178,6 @@ val atoms_read : problem -> key1 list -> formula -> atom list
 
 val atoms_read_by_effect : problem -> key1 list -> effect -> atom list
 
-val changes_to : change list -> atom -> bool -> bool
-
 val interferes :
   problem -> event list -> world -> q option -> key1 list -> formula ->
   effect -> q -> bool
@@ -1238,8 +1236,6 @@ val passages : event list -> passage list
 val put_sets : symbolic -> event -> symbolic
 
 val slice : event list -> nat -> nat -> event list
-
-val symbolic_changes_to : symbolic_change list -> atom -> bool -> bool
 
 val surely_interferes :
   problem -> event list -> task -> names -> timeline -> knowledge -> symbolic

@@ -368,7 +368,15 @@ let rename_times text =
 (* The case trees of the passages of all instances, and of the waits *)
 let timed_cases output keys task events timeline ground_task names by_action action_names =
   let pddl = C.extended task events timeline in
-  let search = search pddl ground_task names in
+  (* If the task has no wait, the variable for waits has one value, which is not known from the atoms that may hold. *)
+  let never_waited = C.base_truth pddl ground_task names { C.literals = []; bounds = [] } timeline.C.waited = Some false in
+  let search leaf candidates splits knowledge =
+    if not never_waited then search pddl ground_task names leaf candidates splits knowledge
+    else
+      let knowledge = { knowledge with C.literals = (timeline.C.waited, false) :: knowledge.C.literals } in
+      match search pddl ground_task names leaf candidates splits knowledge with
+      | C.Decided None -> C.Decided None
+      | tree -> C.SplitAtom (timeline.C.waited, C.Impossible, tree) in
   Printf.bprintf output "(passages";
   List.iter2 (fun name action ->
     let instances = C.instances pddl (fun env -> C.static_false pddl names env action.C.at_start) action.C.parameters [] in
@@ -385,7 +393,7 @@ let timed_cases output keys task events timeline ground_task names by_action act
         let formula, effect = splits_of pddl names d in
         let splits = formula env action.C.at_start @ formula env action.C.over_all @ formula env action.C.at_end
                      @ effect env action.C.start_effect @ effect env action.C.end_effect
-                     @ splits_of_operators ground_task names candidates @ forms_of_operators ground_task names candidates in
+                     @ splits_of_operators ground_task names candidates @ forms_of_operators ground_task names candidates @ [Atom timeline.C.waited] in
         List.iter (fun passage ->
           if C.feasible events passage q then
             match search (C.timed_leaf task events ground_task names timeline action env passage d q) (candidates @ [None]) splits
@@ -425,8 +433,9 @@ let prepare_with invariants_of directory =
   let keys = names_of_keys () in
   let changed_by_events = List.concat_map (fun event -> List.map (fun ((p, _), _) -> snd (Hashtbl.find keys p)) event.C.sets) events in
   let changing = if is_timed then "#phase" :: "#waited" :: changed_by_events, ["#clock"] else [], [] in
+  let clock_range = if is_timed then ["(false (((#clock) 1)) 0)"] else [] in
   let with_names equivalent =
-    let others = claim_and_task ^ names_text changing (invariants_of witness) equivalent problem task witness in
+    let others = claim_and_task ^ names_text changing (clock_range @ invariants_of witness) equivalent problem task witness in
     others, Evidence.read problem.R.action_names (others ^ "(argument () () ()) (goal-case (nothing)) (cases)") in
   let follows (_, evidence) =
     let task = evidence.Evidence.ground_task in
