@@ -119,7 +119,8 @@ type t = {
   claim : string; ground_task : C.task; names : C.names; argument : C.argument;
   labels_at : C.state -> C.positive list;     (* the labels whose variables have the values of a state *)
   case : C.nat -> C.positive list -> C.case_tree; goal_case : C.case_tree;
-  timeline : C.timeline; passage_case : C.nat -> C.positive list -> C.passage -> C.case_tree; wait_case : C.nat -> C.case_tree }
+  timeline : C.timeline; passage_case : C.nat -> C.positive list -> C.passage -> C.case_tree; wait_case : C.nat -> C.case_tree;
+  starts : C.q list }                         (* start times of the steps of the plan *)
 
 (* For timed initial literals: the atoms of the ground task that represent time, and the trees of the
    passages of each instance and of the waits *)
@@ -162,4 +163,5 @@ let read action_names text =
     passage_case = (fun action arguments (((a, b), c), d) ->
       let name = String.concat " " (nth action_names action :: List.map (fun n -> string_of_int (int n)) [a; b; c; d]) in
       Option.value ~default:(C.Decided None) (Cases.find_opt (name, arguments) passages));
-    wait_case = (fun i -> let i = int i in if i < Array.length waits then waits.(i) else C.Decided None) }
+    wait_case = (fun i -> let i = int i in if i < Array.length waits then waits.(i) else C.Decided None);
+    starts = List.map (fun item -> fraction (word item)) (optional "starts") }

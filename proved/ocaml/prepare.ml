@@ -365,6 +365,17 @@ let rename_times text =
     parts 0 0) in
   List.fold_right replace ["\"(the phase ", "\"(#phase "; "\"(has waited)\"", "\"(#waited)\""; "\"(the clock)\"", "\"(#clock)\""] text
 
+(* Start times of a plan. A written time may be rounded down, to less than the end of the step before. *)
+let exact_starts task events starts plan =
+  let rec exact world now = function
+    | [] -> []
+    | (written, (i, env)) :: others ->
+      let start = if C.qle_bool now written then written else now in
+      start :: match Option.bind (C.nth_error task.C.actions i) (fun action -> C.timed_step task events true world now start action env) with
+        | Some (next, d) -> exact next (C.qred (C.qplus start d)) others
+        | None -> List.map fst others in
+  exact (C.initial task) R.zero (List.combine starts plan)
+
 (* The case trees of the passages of all instances, and of the waits *)
 let timed_cases output keys task events timeline ground_task names by_action action_names =
   let pddl = C.extended task events timeline in
@@ -477,6 +488,11 @@ let prepare_with invariants_of directory =
     let atom (head, arguments) = list (fun key -> snd (Hashtbl.find keys key)) (head :: arguments) in
     Printf.bprintf output "(timeline %s %s %s %s)\n" (integer_text (C.Zpos timeline.C.grid)) (list atom timeline.C.phase_atoms)
       (atom timeline.C.waited) (atom timeline.C.clock);
+    if Sys.file_exists (Filename.concat directory "plan.txt") then begin
+      let text = read "plan.txt" in
+      let starts = exact_starts timed_task events (Timed.start_times text) (R.plan problem text) in
+      Printf.bprintf output "(starts %s)\n" (String.concat " " (List.map fraction_text starts))
+    end;
     timed_cases output keys timed_task events timeline ground_task names by_action problem.R.action_names
   end;
   if not is_timed && Hashtbl.mem by_action wait then R.reject "not covered: waiting";
