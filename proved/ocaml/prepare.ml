@@ -379,15 +379,14 @@ let exact_starts task events starts plan =
 (* The case trees of the passages of all instances, and of the waits *)
 let timed_cases output keys task events timeline ground_task names by_action action_names =
   let pddl = C.extended task events timeline in
-  (* If the task has no wait, the variable for waits has one value, which is not known from the atoms that may hold. *)
-  let never_waited = C.base_truth pddl ground_task names { C.literals = []; bounds = [] } timeline.C.waited = Some false in
+  (* Values that a variable cannot have because their atoms never hold, for example in a task without waits *)
+  let never = List.concat_map (fun (_, atoms) -> List.map snd atoms) (C.M.elements names.C.variables)
+              |> List.filter (fun atom -> C.base_truth pddl ground_task names { C.literals = []; bounds = [] } atom = Some false) in
   let search leaf candidates splits knowledge =
-    if not never_waited then search pddl ground_task names leaf candidates splits knowledge
-    else
-      let knowledge = { knowledge with C.literals = (timeline.C.waited, false) :: knowledge.C.literals } in
-      match search pddl ground_task names leaf candidates splits knowledge with
-      | C.Decided None -> C.Decided None
-      | tree -> C.SplitAtom (timeline.C.waited, C.Impossible, tree) in
+    let knowledge = { knowledge with C.literals = List.map (fun atom -> atom, false) never @ knowledge.C.literals } in
+    match search pddl ground_task names leaf candidates splits knowledge with
+    | C.Decided None -> C.Decided None
+    | tree -> List.fold_left (fun tree atom -> C.SplitAtom (atom, C.Impossible, tree)) tree never in
   Printf.bprintf output "(passages";
   List.iter2 (fun name action ->
     let instances = C.instances pddl (fun env -> C.static_false pddl names env action.C.at_start) action.C.parameters [] in
