@@ -12,7 +12,7 @@ Definition occur (w : world) (v : event) : world :=
 Definition elapse (w : world) (vs : list event) : world := fold_left occur vs w.
 
 Section Timed.
-Variables (P : problem) (events : list event).       (* in the order of their times, which are above 0 and differ *)
+Variables (P : problem) (events : list event).       (* in the order of their times, which differ; those at 0 are part of the initial state *)
 Definition after_until (t u : Q) : list event := filter (fun v => less t (time v) && Qle_bool (time v) u) events.
 Definition between (t u : Q) : list event := filter (fun v => less t (time v) && less (time v) u) events.
 Definition at_time (t : Q) : list event := filter (fun v => Qle_bool t (time v) && Qle_bool (time v) t) events.

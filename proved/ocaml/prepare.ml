@@ -328,8 +328,7 @@ let claim_text manifest = match field manifest "claim" with
 
 (* Atoms on which the preconditions and conditional effects of operators depend. *)
 let splits_of_operators ground_task names candidates =
-  List.concat_map (fun candidate ->
-    match candidate with
+  List.concat_map (function
     | Some (i, _) -> (match C.nth_error ground_task.C.operators i with
         | Some operator ->
           splits_of_condition names operator.C.precondition
@@ -340,10 +339,10 @@ let splits_of_operators ground_task names candidates =
 
 (* Comparisons in the preconditions of operators. *)
 let forms_of_operators ground_task names candidates =
-  let forms = List.concat_map (fun candidate ->
-    match candidate with
+  let forms = List.concat_map (function
     | Some (i, choice) -> (match C.nth_error ground_task.C.operators i with
-        | Some operator -> List.filter_map (fun linear -> C.form_of names linear operator.C.slot_sizes choice) operator.C.precondition.C.comparisons
+        | Some operator ->
+          List.filter_map (fun linear -> C.form_of names linear operator.C.slot_sizes choice) operator.C.precondition.C.comparisons
         | None -> [])
     | None -> []) candidates in
   List.map (fun form -> Form form) (List.sort_uniq compare forms)
@@ -384,9 +383,8 @@ let timed_cases output keys task events timeline ground_task names by_action act
               |> List.filter (fun atom -> C.base_truth pddl ground_task names { C.literals = []; bounds = [] } atom = Some false) in
   let search leaf candidates splits knowledge =
     let knowledge = { knowledge with C.literals = List.map (fun atom -> atom, false) never @ knowledge.C.literals } in
-    match search pddl ground_task names leaf candidates splits knowledge with
-    | C.Decided None -> C.Decided None
-    | tree -> List.fold_left (fun tree atom -> C.SplitAtom (atom, C.Impossible, tree)) tree never in
+    let tree = search pddl ground_task names leaf candidates splits knowledge in
+    List.fold_left (fun tree atom -> C.SplitAtom (atom, C.Impossible, tree)) tree never in
   Printf.bprintf output "(passages";
   List.iter2 (fun name action ->
     let instances = C.instances pddl (fun env -> C.static_false pddl names env action.C.at_start) action.C.parameters [] in
@@ -412,7 +410,7 @@ let timed_cases output keys task events timeline ground_task names by_action act
             | tree ->
               let rec int = function C.O -> 0 | C.S n -> 1 + int n in
               let ((a, b), c), e = passage in
-              Printf.bprintf output "\n((%s) (%s) %s)" instance (list (fun n -> string_of_int (int n)) [a; b; c; e] |> fun text -> String.sub text 1 (String.length text - 2)) (tree_text keys tree)
+              Printf.bprintf output "\n((%s) %s %s)" instance (list (fun n -> string_of_int (int n)) [a; b; c; e]) (tree_text keys tree)
             | exception No_tree -> raise (No_invariant instance)) (C.passages events)) instances)
     action_names task.C.actions;
   Printf.bprintf output ")\n(waits";
