@@ -288,7 +288,7 @@ let search problem task names leaf candidates splits knowledge =
         C.SplitForm (form, known false form, known true (negated form)) in
   tree 0 knowledge
 
-(* Stands for the action of operators that wait for a timed initial literal. *)
+(* The name of the action of operators that wait for a timed initial literal; no PDDL action has a blank in its name. *)
 let wait = " wait"
 
 (* Operators of an action with their arguments: an object, or the objects that may fill a slot. *)
