@@ -1,5 +1,6 @@
 (* Semantics of PDDL actions executed one after another: the formal counterpart of
-   crates/pddl/src/validate/definition.md for tasks without timed initial literals and chosen durations. This file, the statement of the theorem [optimal], and the readers are all that
+   crates/pddl/src/validate/definition.md for tasks without chosen durations and timed initial literals; Timed.v has the
+   semantics of the latter. This file, the statement of the theorem [optimal], and the readers are all that
    has to be believed. *)
 From Coq Require Import ZArith QArith List Bool FMapPositive.
 Import ListNotations.

@@ -4,14 +4,14 @@
 # ocaml-findlib.
 set -e
 cd "$(dirname "$0")"
-for file in Task Check Proof Sound Derived Lifted Faithful Symbolic Axioms Simulation Optimal Lists Fronts Extract; do coqc -Q . Proved "$file.v" >/dev/null; done
-for theorem in Sound.sound Derived.derive_closed Axioms.stratum_closed Optimal.optimal Optimal.unsolvable Lists.list_optimal Fronts.front_optimal Fronts.front_undominated; do
+for file in Task Check Proof Sound Derived Lifted Faithful Symbolic Axioms Simulation Optimal Lists Fronts Timed Timeline TimelineProof Extract; do coqc -Q . Proved "$file.v" >/dev/null; done
+for theorem in Sound.sound Derived.derive_closed Axioms.stratum_closed Optimal.optimal Optimal.unsolvable Lists.list_optimal Fronts.front_optimal Fronts.front_undominated TimelineProof.timed_optimal; do
   answer=$(printf 'From Proved Require %s.\nPrint Assumptions %s.\n' "${theorem%.*}" "$theorem" | coqtop -q -Q . Proved 2>/dev/null)
   echo "$answer" | grep -q 'Closed under the global context' || { echo "$theorem rests on assumptions: $answer"; exit 1; }
   echo "$theorem: closed under the global context"
 done
 cd ocaml
-ocamlfind ocamlopt -c checker.mli checker.ml reader.ml evidence.ml exhaustive.ml
+ocamlfind ocamlopt -c checker.mli checker.ml reader.ml evidence.ml timed.ml exhaustive.ml
 for program in check check_list check_front prepare mutants differential semantics; do
   # `metaplan verify --proved` finds its programs by these names, also in PATH.
   case $program in
@@ -21,5 +21,5 @@ for program in check check_list check_front prepare mutants differential semanti
   esac
   # The search is for tests only.
   case $program in mutants | differential) search=exhaustive.cmx ;; *) search= ;; esac
-  ocamlfind ocamlopt checker.cmx reader.cmx evidence.cmx $search "$program.ml" -o "$name"
+  ocamlfind ocamlopt checker.cmx reader.cmx evidence.cmx timed.cmx $search "$program.ml" -o "$name"
 done

@@ -51,5 +51,10 @@ row 'theorem `front_optimal` in `proved/Fronts.v`' <<EOF
 $(sed -n '/^Theorem front_optimal/,/^Proof/p' Fronts.v | grep -v '^Proof')
 EOF
 row '`proved/ocaml/check_front.ml`' <ocaml/check_front.ml
+row '`proved/Timed.v`' <Timed.v
+row 'theorem `timed_optimal` in `proved/TimelineProof.v`' <<EOF
+$(sed -n '/^Theorem timed_optimal/,/^Proof/p' TimelineProof.v | grep -v '^Proof')
+EOF
+row '`proved/ocaml/timed.ml`' <ocaml/timed.ml
 total=$believed
 [ "$total" -le "$limit" ] || { echo "more than $limit lines have to be believed" >&2; exit 1; }

@@ -1,4 +1,5 @@
-(* Checks a certificate with the function that theorem [optimal] is about. Believed. Exit statuses:
+(* Checks a certificate with the function that theorem [optimal] is about, or with timed.ml if there
+   are timed initial literals. Believed. Exit statuses:
    0 proved, 30 not proved, 3 rejected. *)
 let read_file path =
   let channel = open_in_bin path in
@@ -6,7 +7,9 @@ let read_file path =
 
 let check directory evidence_file =
   let read name = read_file (Filename.concat directory name) in
-  let problem = Reader.problem (read "domain.pddl") (read "problem.pddl") in
+  let timed_literals = ref [] in
+  let problem = Reader.problem ~timed_literals (read "domain.pddl") (read "problem.pddl") in
+  if !timed_literals <> [] then Timed.check problem !timed_literals read (read_file evidence_file) else
   let plan = if Sys.file_exists (Filename.concat directory "plan.txt") then Reader.plan problem (read "plan.txt") else [] in
   let evidence = Evidence.read problem.Reader.action_names (read_file evidence_file) in
   let claim = Reader.claim problem evidence.Evidence.claim in

@@ -59,6 +59,15 @@ module Coq__1 = struct
 end
 include Coq__1
 
+(** val sub : nat -> nat -> nat **)
+
+let rec sub n m =
+  match n with
+  | O -> n
+  | S k -> (match m with
+            | O -> n
+            | S l -> sub k l)
+
 type positive =
 | XI of positive
 | XO of positive
@@ -673,6 +682,15 @@ let rec firstn n l =
   | S n0 -> (match l with
              | [] -> []
              | a :: l0 -> a :: (firstn n0 l0))
+
+(** val skipn : nat -> 'a1 list -> 'a1 list **)
+
+let rec skipn n l =
+  match n with
+  | O -> l
+  | S n0 -> (match l with
+             | [] -> []
+             | _ :: l0 -> skipn n0 l0)
 
 (** val seq : nat -> nat -> nat list **)
 
@@ -2763,7 +2781,7 @@ let rec needs_undefined p t0 n k s d env = function
     problem -> task -> names -> knowledge -> symbolic -> result -> q -> key1
     list -> formula -> effect -> outcome **)
 
-let symbolic_happening p t0 n k s d time env f e =
+let symbolic_happening p t0 n k s d time0 env f e =
   match symbolic_truth p t0 n k s d env f with
   | Some b ->
     if b
@@ -2778,7 +2796,7 @@ let symbolic_happening p t0 n k s d time env f e =
                       (app (atoms_set_to cs true)
                         (app (atoms_set_to cs false) s.new_truths));
                       new_values = (app l s.new_values); stale = s.stale },
-                      time)
+                      time0)
                   | None -> Unclear)
                | None -> Unclear)
     else Never
@@ -2792,7 +2810,7 @@ let symbolic_happening p t0 n k s d time env f e =
                After ({ new_truths =
                  (app (atoms_set_to cs true)
                    (app (atoms_set_to cs false) s.new_truths)); new_values =
-                 (app l s.new_values); stale = s.stale }, time)
+                 (app l s.new_values); stale = s.stale }, time0)
              | None -> Unclear)
           | None -> Unclear)
 
@@ -2994,15 +3012,15 @@ let gathered p t0 n a env =
        let (l, d) = f in
        (match l with
         | [] ->
-          let time = Is (constant d) in
-          let k = conjuncts p n unchanged time env a.at_start in
+          let time0 = Is (constant d) in
+          let k = conjuncts p n unchanged time0 env a.at_start in
           if qeq_bool d { qnum = Z0; qden = XH }
-          then join k (conjuncts p n unchanged time env a.at_end)
-          else (match symbolic_happening p t0 n k unchanged time d env
+          then join k (conjuncts p n unchanged time0 env a.at_end)
+          else (match symbolic_happening p t0 n k unchanged time0 d env
                         a.at_start a.start_effect with
                 | After (s, _) ->
                   join k
-                    (conjuncts p n (make_stale s) time env (And (a.over_all,
+                    (conjuncts p n (make_stale s) time0 env (And (a.over_all,
                       a.at_end)))
                 | _ -> k)
         | _ :: _ -> { literals = []; bounds = [] })
@@ -3409,14 +3427,14 @@ let number_ok n s o n0 =
 
 (** val growth : problem -> names -> symbolic -> q -> q option **)
 
-let growth p n s time =
+let growth p n s time0 =
   match plus_result (symbolic_expression p n s Undefined [] p.metric)
           { qnum = (Zneg XH); qden = XH }
           (symbolic_expression p n unchanged Undefined [] p.metric) with
   | Is f ->
     let (l, c) = f in
     (match l with
-     | [] -> Some (qplus (qplus c (qmult p.per_time time)) p.per_step)
+     | [] -> Some (qplus (qplus c (qmult p.per_time time0)) p.per_step)
      | _ :: _ -> None)
   | _ -> None
 
@@ -3430,7 +3448,7 @@ let step_cost = function
     problem -> task -> names -> knowledge -> symbolic -> q ->
     (operator * choice) option -> bool **)
 
-let simulated p t0 n k s time o =
+let simulated p t0 n k s time0 o =
   match match o with
         | Some p0 ->
           let (o0, ch) = p0 in
@@ -3461,7 +3479,7 @@ let simulated p t0 n k s time o =
               match find_atom n.number_of (fst l) with
               | Some n0 -> n0 :: []
               | None -> []) s.new_values))))
-      (match growth p n s time with
+      (match growth p n s time0 with
        | Some g ->
          qle_bool (inject_Z (step_cost o))
            (qmult g { qnum = (Zpos n.cost_scale); qden = XH })
@@ -3655,7 +3673,7 @@ let leaf_ok p t0 n k a env o =
   match symbolic_step p t0 n k a env with
   | Never -> true
   | Unclear -> projected_ok p t0 n k a env o
-  | After (s, time) ->
+  | After (s, time0) ->
     (&&)
       ((&&)
         ((&&)
@@ -3665,7 +3683,7 @@ let leaf_ok p t0 n k a env o =
             | None -> true) s.new_truths)
           (forallb (stays_exclusive p t0 n k s) n.exclusive))
         (forallb (stays_invariant k s) n.invariants))
-      (simulated p t0 n k s time o)
+      (simulated p t0 n k s time0 o)
 
 (** val tree_ok :
     problem -> task -> names -> (knowledge -> (nat * choice) option -> bool)
@@ -4191,3 +4209,656 @@ let rec check_points p first second limit es = function
 
 let check_front p first second es points =
   (&&) (is_untimed second) (check_points p first second None es points)
+
+type event = { time : q; sets : (atom * bool) list }
+
+(** val occur : world -> event -> world **)
+
+let occur w v =
+  { holds_in = (fun a ->
+    match assoc a v.sets with
+    | Some b -> b
+    | None -> w.holds_in a); value_in = w.value_in }
+
+(** val elapse : world -> event list -> world **)
+
+let elapse w vs =
+  fold_left occur vs w
+
+(** val after_until : event list -> q -> q -> event list **)
+
+let after_until events t0 u =
+  filter (fun v -> (&&) (less t0 v.time) (qle_bool v.time u)) events
+
+(** val between : event list -> q -> q -> event list **)
+
+let between events t0 u =
+  filter (fun v -> (&&) (less t0 v.time) (less v.time u)) events
+
+(** val at_time : event list -> q -> event list **)
+
+let at_time events t0 =
+  filter (fun v -> (&&) (qle_bool t0 v.time) (qle_bool v.time t0)) events
+
+(** val atoms_read : problem -> key1 list -> formula -> atom list **)
+
+let rec atoms_read p env = function
+| Atom (p0, ts) ->
+  (match ground env ts with
+   | Some l -> (p0, l) :: []
+   | None -> [])
+| Not g -> atoms_read p env g
+| And (g, h) -> app (atoms_read p env g) (atoms_read p env h)
+| Forall (t0, g) ->
+  flat_map (fun o -> atoms_read p (app env (o :: [])) g) (p.objects t0)
+| _ -> []
+
+(** val atoms_read_by_effect : problem -> key1 list -> effect -> atom list **)
+
+let rec atoms_read_by_effect p env = function
+| Both (a, b) ->
+  app (atoms_read_by_effect p env a) (atoms_read_by_effect p env b)
+| When (f, a) -> app (atoms_read p env f) (atoms_read_by_effect p env a)
+| Each (t0, a) ->
+  flat_map (fun o -> atoms_read_by_effect p (app env (o :: [])) a)
+    (p.objects t0)
+| _ -> []
+
+(** val interferes :
+    problem -> event list -> world -> q option -> key1 list -> formula ->
+    effect -> q -> bool **)
+
+let interferes p events w d env f e t0 =
+  existsb (fun l ->
+    (||)
+      (existsb (atom_eqb (fst l))
+        (app (atoms_read p env f) (atoms_read_by_effect p env e)))
+      (match changes p w d env e with
+       | Some cs -> sets_atom cs (fst l) (negb (snd l))
+       | None -> false)) (flat_map (fun e0 -> e0.sets) (at_time events t0))
+
+(** val pass :
+    problem -> world -> q option -> key1 list -> formula -> event list ->
+    world option **)
+
+let rec pass p w d env f = function
+| [] -> Some w
+| v :: r ->
+  (match truth p w d env f with
+   | Some b -> if b then pass p (occur w v) d env f r else None
+   | None -> None)
+
+(** val timed_step :
+    problem -> event list -> bool -> world -> q -> q -> action -> key1 list
+    -> (world * q) option **)
+
+let timed_step p events allow_zero w now s a env =
+  if (||) (less s now)
+       (negb
+         ((&&) (Nat.eqb (length env) (length a.parameters))
+           (forallb (fun x ->
+             existsb (Coq_Pos.eqb (fst x)) (p.objects (snd x)))
+             (combine env a.parameters))))
+  then None
+  else let w0 = elapse w (after_until events now s) in
+       (match a.duration with
+        | Some x ->
+          (match eval w0 None env x with
+           | Some d ->
+             if less d { qnum = Z0; qden = XH }
+             then None
+             else if qeq_bool d { qnum = Z0; qden = XH }
+                  then let f = And (a.at_start, a.at_end) in
+                       let e = Both (a.start_effect, a.end_effect) in
+                       if (||) (negb allow_zero)
+                            (interferes p events w0 (Some d) env f e s)
+                       then None
+                       else option_map (fun w1 -> (w1, d))
+                              (happening p w0 (Some d) env f e)
+                  else if interferes p events w0 (Some d) env a.at_start
+                            a.start_effect s
+                       then None
+                       else (match happening p w0 (Some d) env a.at_start
+                                     a.start_effect with
+                             | Some w1 ->
+                               (match pass p w1 (Some d) env a.over_all
+                                        (between events s (qplus s d)) with
+                                | Some w2 ->
+                                  if interferes p events w2 (Some d) env
+                                       a.at_end a.end_effect (qplus s d)
+                                  then None
+                                  else option_map (fun w3 ->
+                                         ((elapse w3
+                                            (at_time events (qplus s d))),
+                                         d))
+                                         (happening p w2 (Some d) env (And
+                                           (a.over_all, a.at_end))
+                                           a.end_effect)
+                                | None -> None)
+                             | None -> None)
+           | None -> None)
+        | None ->
+          if interferes p events w0 None env a.at_start a.start_effect s
+          then None
+          else option_map (fun w1 -> (w1, { qnum = Z0; qden = XH }))
+                 (happening p w0 None env a.at_start a.start_effect))
+
+(** val timed_execute :
+    problem -> event list -> bool -> world -> q -> q -> (q * (nat * key1
+    list)) list -> (world * q) option **)
+
+let rec timed_execute p events allow_zero w now spent = function
+| [] ->
+  (match truth p w None [] p.goal_formula with
+   | Some b -> if b then Some (w, spent) else None
+   | None -> None)
+| p0 :: r ->
+  let (s, p1) = p0 in
+  let (i, env) = p1 in
+  (match nth_error p.actions i with
+   | Some a ->
+     (match timed_step p events allow_zero w now s a env with
+      | Some p2 ->
+        let (w', d) = p2 in
+        timed_execute p events allow_zero w' (qplus s d)
+          (qred (qplus (qplus spent (qmult p.per_time d)) p.per_step)) r
+      | None -> None)
+   | None -> None)
+
+type timeline = { grid : positive; phase_atoms : atom list; waited : 
+                  atom; clock : atom }
+
+type passage = ((nat * nat) * nat) * nat
+
+(** val is_present : 'a1 option -> bool **)
+
+let is_present = function
+| Some _ -> true
+| None -> false
+
+(** val on_grid : timeline -> q -> bool **)
+
+let on_grid x q0 =
+  Coq_Pos.eqb (qred (qmult q0 { qnum = (Zpos x.grid); qden = XH })).qden XH
+
+(** val moment : timeline -> q **)
+
+let moment x =
+  { qnum = (Zpos XH); qden = x.grid }
+
+(** val phase : timeline -> nat -> atom **)
+
+let phase x i =
+  nth i x.phase_atoms x.waited
+
+(** val up_to : event list -> q -> nat **)
+
+let up_to events t0 =
+  length (filter (fun v -> qle_bool v.time t0) events)
+
+(** val extended : problem -> event list -> timeline -> problem **)
+
+let extended p events x =
+  { objects = p.objects; actions = []; strata = []; initial_atoms =
+    (add_atom (phase x (up_to events { qnum = Z0; qden = XH })) ()
+      p.initial_atoms); initial_values =
+    (add_atom x.clock { qnum = Z0; qden = XH } p.initial_values);
+    goal_formula = (And ((Not (Atom ((fst x.waited),
+    (map (fun x0 -> Object x0) (snd x.waited))))), p.goal_formula)); metric =
+    p.metric; per_time = p.per_time; per_step = { qnum = Z0; qden = XH } }
+
+(** val is_added : timeline -> key1 -> bool **)
+
+let is_added x p =
+  existsb (Coq_Pos.eqb p)
+    ((fst x.waited) :: ((fst x.clock) :: (map fst x.phase_atoms)))
+
+(** val expression_free : timeline -> expression -> bool **)
+
+let rec expression_free x = function
+| Fluent (f, _) -> negb (is_added x f)
+| Plus (a, b) -> (&&) (expression_free x a) (expression_free x b)
+| Minus (a, b) -> (&&) (expression_free x a) (expression_free x b)
+| Times (a, b) -> (&&) (expression_free x a) (expression_free x b)
+| Over (a, b) -> (&&) (expression_free x a) (expression_free x b)
+| _ -> true
+
+(** val formula_free : timeline -> formula -> bool **)
+
+let rec formula_free x = function
+| Atom (p, _) -> negb (is_added x p)
+| Compare (_, a, b) -> (&&) (expression_free x a) (expression_free x b)
+| Not g -> formula_free x g
+| And (g, h) -> (&&) (formula_free x g) (formula_free x h)
+| Forall (_, g) -> formula_free x g
+| _ -> true
+
+(** val effect_free : timeline -> effect -> bool **)
+
+let rec effect_free x = function
+| Nothing -> true
+| Put (_, p, _) -> negb (is_added x p)
+| Change (_, f, _, x0) -> (&&) (negb (is_added x f)) (expression_free x x0)
+| Both (a, b) -> (&&) (effect_free x a) (effect_free x b)
+| When (f, a) -> (&&) (formula_free x f) (effect_free x a)
+| Each (_, a) -> effect_free x a
+
+(** val action_free : timeline -> action -> bool **)
+
+let action_free x a =
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&)
+          ((&&) (formula_free x a.at_start) (effect_free x a.start_effect))
+          (formula_free x a.over_all)) (formula_free x a.at_end))
+      (effect_free x a.end_effect))
+    (match a.duration with
+     | Some e -> expression_free x e
+     | None -> true)
+
+(** val time_at : event list -> nat -> q list **)
+
+let time_at events i =
+  match nth_error events i with
+  | Some v -> v.time :: []
+  | None -> []
+
+(** val last_time : event list -> nat -> q list **)
+
+let last_time events = function
+| O -> []
+| S j -> time_at events j
+
+(** val lower : event list -> passage -> q -> (q * bool) list **)
+
+let lower events g d =
+  let (p, e) = g in
+  let (p0, c) = p in
+  let (a, b) = p0 in
+  ({ qnum = Z0; qden = XH },
+  false) :: (app (map (fun t0 -> (t0, (Nat.eqb a b))) (last_time events b))
+              (map (fun t0 -> ((qminus t0 d), (Nat.eqb c e)))
+                (last_time events e)))
+
+(** val upper : event list -> passage -> q -> (q * bool) list **)
+
+let upper events g d =
+  let (p, e) = g in
+  let (p0, c) = p in
+  let (a, b) = p0 in
+  app (map (fun t0 -> (t0, (Nat.eqb a b))) (time_at events a))
+    (map (fun t0 -> ((qminus t0 d), (Nat.eqb c e))) (time_at events c))
+
+(** val feasible : event list -> passage -> q -> bool **)
+
+let feasible events g d =
+  forallb (fun l ->
+    forallb (fun u ->
+      if (||) (snd l) (snd u)
+      then less (fst l) (fst u)
+      else qle_bool (fst l) (fst u)) (upper events g d)) (lower events g d)
+
+(** val passages : event list -> passage list **)
+
+let passages events =
+  let n = length events in
+  let from = fun a -> seq a (sub (S n) a) in
+  let next = fun a -> filter (fun b -> Nat.leb b n) (a :: ((S a) :: [])) in
+  flat_map (fun a ->
+    flat_map (fun b ->
+      flat_map (fun c -> map (fun e -> (((a, b), c), e)) (next c)) (from a))
+      (next a)) (from O)
+
+(** val put_sets : symbolic -> event -> symbolic **)
+
+let put_sets s v =
+  { new_truths = (app v.sets s.new_truths); new_values = s.new_values;
+    stale = s.stale }
+
+(** val slice : event list -> nat -> nat -> event list **)
+
+let slice events i j =
+  skipn i (firstn j events)
+
+(** val surely_interferes :
+    problem -> event list -> task -> names -> timeline -> knowledge ->
+    symbolic -> result -> key1 list -> formula -> effect -> event list -> bool **)
+
+let surely_interferes p events t0 n x k s d env f e vs =
+  existsb (fun l ->
+    (||)
+      (existsb (atom_eqb (fst l))
+        (app (atoms_read p env f) (atoms_read_by_effect p env e)))
+      (match symbolic_changes (extended p events x) t0 n k s d env e with
+       | Some ss ->
+         is_present (assoc (fst l) (atoms_set_to ss (negb (snd l))))
+       | None -> false)) (flat_map (fun e0 -> e0.sets) vs)
+
+(** val symbolic_pass :
+    problem -> event list -> task -> names -> timeline -> knowledge ->
+    symbolic -> result -> key1 list -> formula -> event list -> symbolic
+    option **)
+
+let rec symbolic_pass p events t0 n x k s d env f = function
+| [] -> Some s
+| v :: r ->
+  (match symbolic_truth (extended p events x) t0 n k s d env f with
+   | Some b ->
+     if b
+     then symbolic_pass p events t0 n x k (put_sets s v) d env f r
+     else None
+   | None -> symbolic_pass p events t0 n x k (put_sets s v) d env f r)
+
+(** val symbolic_timed_step :
+    problem -> event list -> task -> names -> timeline -> knowledge -> action
+    -> key1 list -> passage -> result -> q -> outcome **)
+
+let symbolic_timed_step p events t0 n x k a env g d q0 =
+  let (p0, n0) = g in
+  let (p1, m) = p0 in
+  let (i, j) = p1 in
+  let happens = fun s time0 f e ->
+    symbolic_happening (extended p events x) t0 n k s d time0 env f e
+  in
+  (match a.duration with
+   | Some _ ->
+     if qeq_bool q0 { qnum = Z0; qden = XH }
+     then let f = And (a.at_start, a.at_end) in
+          let e = Both (a.start_effect, a.end_effect) in
+          if surely_interferes p events t0 n x k unchanged d env f e
+               (slice events i j)
+          then Never
+          else happens unchanged q0 f e
+     else if surely_interferes p events t0 n x k unchanged d env a.at_start
+               a.start_effect (slice events i j)
+          then Never
+          else (match happens unchanged q0 a.at_start a.start_effect with
+                | After (s, _) ->
+                  (match symbolic_pass p events t0 n x k s d env a.over_all
+                           (slice events j m) with
+                   | Some s0 ->
+                     if surely_interferes p events t0 n x k s0 d env a.at_end
+                          a.end_effect (slice events m n0)
+                     then Never
+                     else (match happens s0 q0 (And (a.over_all, a.at_end))
+                                   a.end_effect with
+                           | After (s1, t1) ->
+                             After
+                               ((fold_left put_sets (slice events m n0) s1),
+                               t1)
+                           | x0 -> x0)
+                   | None -> Never)
+                | x0 -> x0)
+   | None ->
+     if surely_interferes p events t0 n x k unchanged d env a.at_start
+          a.start_effect (slice events i j)
+     then Never
+     else happens unchanged { qnum = Z0; qden = XH } a.at_start a.start_effect)
+
+(** val new_clock :
+    names -> timeline -> (operator * choice) option -> form option **)
+
+let new_clock n x o =
+  match find_atom n.number_of x.clock with
+  | Some n0 ->
+    (match o with
+     | Some p ->
+       let (o0, ch) = p in
+       (match find (fun c -> Coq_Pos.eqb (fst c) n0) o0.number_effects with
+        | Some c -> form_of n (snd c) o0.slot_sizes ch
+        | None -> Some (fluent x.clock))
+     | None -> Some (fluent x.clock))
+  | None -> Some (fluent x.clock)
+
+(** val clock_ok : timeline -> form -> (q * bool) list -> q -> bool **)
+
+let clock_ok x g starts d =
+  let (l, c) = g in
+  (match l with
+   | [] ->
+     existsb (fun l0 ->
+       (||) (qle_bool c (qplus (fst l0) d))
+         ((&&) ((&&) (snd l0) (on_grid x (qplus (fst l0) d)))
+           (less c (qplus (qplus (fst l0) d) (moment x))))) starts
+   | p :: l0 ->
+     let (a, q0) = p in
+     (match l0 with
+      | [] ->
+        (&&)
+          ((&&) (atom_eqb a x.clock)
+            (qeq_bool q0 { qnum = (Zpos XH); qden = XH }))
+          ((||) (qeq_bool c d) (qeq_bool c { qnum = Z0; qden = XH }))
+      | _ :: _ -> false))
+
+(** val closes :
+    problem -> event list -> task -> names -> timeline -> knowledge ->
+    symbolic -> q -> (atom * bool) list -> (q * bool) list -> q ->
+    (operator * choice) option -> bool **)
+
+let closes p events t0 n x k s t1 marks starts d o =
+  match new_clock n x o with
+  | Some g ->
+    let s0 = { new_truths = (app marks s.new_truths); new_values = ((x.clock,
+      g) :: s.new_values); stale = s.stale }
+    in
+    (&&)
+      ((&&)
+        ((&&)
+          ((&&) (clock_ok x g starts d)
+            (forallb (fun l ->
+              match assoc (fst l) s0.new_truths with
+              | Some b -> if b then mem0 n.may_hold (fst l) else true
+              | None -> true) s0.new_truths))
+          (forallb (stays_exclusive (extended p events x) t0 n k s0)
+            n.exclusive)) (forallb (stays_invariant k s0) n.invariants))
+      (simulated (extended p events x) t0 n k s0 t1 o)
+  | None -> false
+
+(** val with_operator :
+    task -> ((operator * choice) option -> bool) -> (nat * choice) option ->
+    bool **)
+
+let with_operator t0 leaf = function
+| Some p ->
+  let (i, ch) = p in
+  (match nth_error t0.operators i with
+   | Some o0 -> leaf (Some (o0, ch))
+   | None -> false)
+| None -> leaf None
+
+(** val timed_leaf :
+    problem -> event list -> task -> names -> timeline -> action -> key1 list
+    -> passage -> result -> q -> knowledge -> (nat * choice) option -> bool **)
+
+let timed_leaf p events t0 n x a env g d q0 k o =
+  match symbolic_timed_step p events t0 n x k a env g d q0 with
+  | Never -> true
+  | Unclear -> false
+  | After (s, t1) ->
+    let (p0, until) = g in
+    let (p1, _) = p0 in
+    let (_, from) = p1 in
+    with_operator t0
+      (closes p events t0 n x k s t1 (((phase x until),
+        true) :: (((phase x from), false) :: ((x.waited, false) :: [])))
+        (lower events g q0) q0) o
+
+(** val wait_leaf :
+    problem -> event list -> task -> names -> timeline -> nat -> event ->
+    knowledge -> (nat * choice) option -> bool **)
+
+let wait_leaf p events t0 n x i v k o =
+  with_operator t0
+    (closes p events t0 n x k (put_sets unchanged v) { qnum = Z0; qden = XH }
+      (((phase x (S i)), true) :: (((phase x i), false) :: ((x.waited,
+      true) :: []))) ((v.time, false) :: []) { qnum = Z0; qden = XH }) o
+
+(** val start_knowledge :
+    problem -> event list -> names -> timeline -> action -> key1 list ->
+    passage -> result -> q -> knowledge **)
+
+let start_knowledge p events n x a env g d q0 =
+  let k = conjuncts (extended p events x) n unchanged d env a.at_start in
+  let (p0, _) = g in
+  let (p1, _) = p0 in
+  let (_, from) = p1 in
+  with_invariants n { literals = (((phase x from), true) :: k.literals);
+    bounds =
+    (app
+      (map (fun u -> ((snd u), (((x.clock, { qnum = (Zneg XH); qden =
+        XH }) :: []), (fst u)))) (upper events g q0)) k.bounds) }
+
+(** val fixed_duration :
+    problem -> event list -> names -> timeline -> action -> key1 list ->
+    (result * q) option option **)
+
+let fixed_duration p events n x a env =
+  match a.duration with
+  | Some e ->
+    (match symbolic_expression (extended p events x) n unchanged Undefined
+             env e with
+     | Undefined -> Some None
+     | Unknown -> None
+     | Is f ->
+       let (l, q0) = f in
+       (match l with
+        | [] -> Some (Some ((Is (constant q0)), q0))
+        | _ :: _ -> None))
+  | None -> Some (Some (Undefined, { qnum = Z0; qden = XH }))
+
+(** val timed_instance_ok :
+    problem -> event list -> task -> names -> timeline -> (nat -> key1 list
+    -> passage -> case_tree) -> nat -> action -> key1 list -> bool **)
+
+let timed_instance_ok p events t0 n x case i a env =
+  match fixed_duration p events n x a env with
+  | Some o ->
+    (match o with
+     | Some p0 ->
+       let (d, q0) = p0 in
+       (||) (less q0 { qnum = Z0; qden = XH })
+         ((&&) (on_grid x q0)
+           (forallb (fun g ->
+             (||) (negb (feasible events g q0))
+               (tree_ok (extended p events x) t0 n
+                 (timed_leaf p events t0 n x a env g d q0)
+                 (start_knowledge p events n x a env g d q0) (case i env g)))
+             (passages events)))
+     | None -> true)
+  | None -> false
+
+(** val timed_action_ok :
+    problem -> event list -> task -> names -> timeline -> (nat -> key1 list
+    -> passage -> case_tree) -> nat -> action -> bool **)
+
+let timed_action_ok p events t0 n x case i a =
+  (&&)
+    ((&&) (action_free x a)
+      (forallb n.changing
+        (app (effect_heads a.start_effect) (effect_heads a.end_effect))))
+    (forallb (timed_instance_ok p events t0 n x case i a)
+      (instances (extended p events x) (fun env ->
+        static_false (extended p events x) n env a.at_start) a.parameters []))
+
+(** val wait_ok :
+    problem -> event list -> task -> names -> timeline -> (nat -> case_tree)
+    -> nat -> event -> bool **)
+
+let wait_ok p events t0 n x wait_case i v =
+  tree_ok (extended p events x) t0 n (wait_leaf p events t0 n x i v)
+    (with_invariants n { literals = (((phase x i), true) :: []); bounds =
+      [] }) (wait_case i)
+
+(** val is_sorted : event list -> bool **)
+
+let rec is_sorted = function
+| [] -> true
+| v :: r -> (&&) (forallb (fun u -> less v.time u.time) r) (is_sorted r)
+
+(** val differ : atom list -> bool **)
+
+let rec differ = function
+| [] -> true
+| a :: r -> (&&) (negb (existsb (atom_eqb a) r)) (differ r)
+
+(** val timed_faithful :
+    problem -> event list -> task -> names -> timeline -> (nat -> key1 list
+    -> passage -> case_tree) -> (nat -> case_tree) -> case_tree -> bool **)
+
+let timed_faithful p events t0 n x case wait_case goal_case =
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&)
+          ((&&)
+            ((&&)
+              ((&&)
+                ((&&)
+                  ((&&)
+                    ((&&)
+                      ((&&)
+                        ((&&)
+                          ((&&)
+                            (match p.strata with
+                             | [] -> true
+                             | _ :: _ -> false)
+                            (qeq_bool p.per_step { qnum = Z0; qden = XH }))
+                          (faithful (extended p events x) t0 n (fun _ _ ->
+                            Decided None) goal_case)) (is_sorted events))
+                      (forallb (fun v -> on_grid x v.time) events))
+                    (forallb (fun l ->
+                      (&&) (n.changing (fst (fst l)))
+                        (negb (is_added x (fst (fst l)))))
+                      (flat_map (fun e -> e.sets) events)))
+                  (forallb n.changing
+                    ((fst x.waited) :: ((fst x.clock) :: (map fst
+                                                           x.phase_atoms)))))
+                (differ (x.waited :: x.phase_atoms)))
+              (Nat.eqb (length x.phase_atoms) (S (length events))))
+            (forallb (fun a -> negb ((initial p).holds_in a))
+              (x.waited :: x.phase_atoms))) (formula_free x p.goal_formula))
+        (expression_free x p.metric))
+      (forallb (fun iv ->
+        wait_ok p events t0 n x wait_case (fst iv) (snd iv))
+        (combine (seq O (length events)) events)))
+    (forallb (fun ia ->
+      timed_action_ok p events t0 n x case (fst ia) (snd ia))
+      (combine (seq O (length p.actions)) p.actions))
+
+(** val check_timed :
+    problem -> event list -> task -> names -> timeline -> (nat -> key1 list
+    -> passage -> case_tree) -> (nat -> case_tree) -> case_tree -> argument
+    -> (state -> positive list) -> (q * (nat * key1 list)) list -> q option
+    -> bool **)
+
+let check_timed p events t0 n x case wait_case goal_case a oracle plan claim =
+  (&&)
+    ((&&) (check_task t0)
+      (timed_faithful p events t0 n x case wait_case goal_case))
+    (match eval (initial p) None [] p.metric with
+     | Some first ->
+       (match claim with
+        | Some m ->
+          (&&)
+            ((&&) (is_linear (extended p events x) n)
+              (match timed_execute p events false (initial p) { qnum = Z0;
+                       qden = XH } { qnum = Z0; qden = XH } plan with
+               | Some p0 ->
+                 let (w, spent) = p0 in
+                 (match final_metric p w spent with
+                  | Some m' -> qeq_bool m' m
+                  | None -> false)
+               | None -> false))
+            (let cost0 =
+               qred
+                 (qmult (qminus m first) { qnum = (Zpos n.cost_scale); qden =
+                   XH })
+             in
+             (&&) (Coq_Pos.eqb cost0.qden XH)
+               (check t0 a (Some cost0.qnum) oracle))
+        | None -> check t0 a None oracle)
+     | None ->
+       (match claim with
+        | Some _ -> false
+        | None -> check t0 a None oracle))

@@ -24,6 +24,8 @@ val compOpp : comparison -> comparison
 
 val add : nat -> nat -> nat
 
+val sub : nat -> nat -> nat
+
 type positive =
 | XI of positive
 | XO of positive
@@ -181,6 +183,8 @@ val find : ('a1 -> bool) -> 'a1 list -> 'a1 option
 val combine : 'a1 list -> 'a2 list -> ('a1 * 'a2) list
 
 val firstn : nat -> 'a1 list -> 'a1 list
+
+val skipn : nat -> 'a1 list -> 'a1 list
 
 val seq : nat -> nat -> nat list
 
@@ -1157,3 +1161,144 @@ val check_points :
 
 val check_front :
   problem -> objective -> objective -> evidence list -> point list -> bool
+
+type event = { time : q; sets : (atom * bool) list }
+
+val occur : world -> event -> world
+
+val elapse : world -> event list -> world
+
+val after_until : event list -> q -> q -> event list
+
+val between : event list -> q -> q -> event list
+
+val at_time : event list -> q -> event list
+
+val atoms_read : problem -> key1 list -> formula -> atom list
+
+val atoms_read_by_effect : problem -> key1 list -> effect -> atom list
+
+val interferes :
+  problem -> event list -> world -> q option -> key1 list -> formula ->
+  effect -> q -> bool
+
+val pass :
+  problem -> world -> q option -> key1 list -> formula -> event list -> world
+  option
+
+val timed_step :
+  problem -> event list -> bool -> world -> q -> q -> action -> key1 list ->
+  (world * q) option
+
+val timed_execute :
+  problem -> event list -> bool -> world -> q -> q -> (q * (nat * key1 list))
+  list -> (world * q) option
+
+type timeline = { grid : positive; phase_atoms : atom list; waited : 
+                  atom; clock : atom }
+
+type passage = ((nat * nat) * nat) * nat
+
+val is_present : 'a1 option -> bool
+
+val on_grid : timeline -> q -> bool
+
+val moment : timeline -> q
+
+val phase : timeline -> nat -> atom
+
+val up_to : event list -> q -> nat
+
+val extended : problem -> event list -> timeline -> problem
+
+val is_added : timeline -> key1 -> bool
+
+val expression_free : timeline -> expression -> bool
+
+val formula_free : timeline -> formula -> bool
+
+val effect_free : timeline -> effect -> bool
+
+val action_free : timeline -> action -> bool
+
+val time_at : event list -> nat -> q list
+
+val last_time : event list -> nat -> q list
+
+val lower : event list -> passage -> q -> (q * bool) list
+
+val upper : event list -> passage -> q -> (q * bool) list
+
+val feasible : event list -> passage -> q -> bool
+
+val passages : event list -> passage list
+
+val put_sets : symbolic -> event -> symbolic
+
+val slice : event list -> nat -> nat -> event list
+
+val surely_interferes :
+  problem -> event list -> task -> names -> timeline -> knowledge -> symbolic
+  -> result -> key1 list -> formula -> effect -> event list -> bool
+
+val symbolic_pass :
+  problem -> event list -> task -> names -> timeline -> knowledge -> symbolic
+  -> result -> key1 list -> formula -> event list -> symbolic option
+
+val symbolic_timed_step :
+  problem -> event list -> task -> names -> timeline -> knowledge -> action
+  -> key1 list -> passage -> result -> q -> outcome
+
+val new_clock : names -> timeline -> (operator * choice) option -> form option
+
+val clock_ok : timeline -> form -> (q * bool) list -> q -> bool
+
+val closes :
+  problem -> event list -> task -> names -> timeline -> knowledge -> symbolic
+  -> q -> (atom * bool) list -> (q * bool) list -> q -> (operator * choice)
+  option -> bool
+
+val with_operator :
+  task -> ((operator * choice) option -> bool) -> (nat * choice) option ->
+  bool
+
+val timed_leaf :
+  problem -> event list -> task -> names -> timeline -> action -> key1 list
+  -> passage -> result -> q -> knowledge -> (nat * choice) option -> bool
+
+val wait_leaf :
+  problem -> event list -> task -> names -> timeline -> nat -> event ->
+  knowledge -> (nat * choice) option -> bool
+
+val start_knowledge :
+  problem -> event list -> names -> timeline -> action -> key1 list ->
+  passage -> result -> q -> knowledge
+
+val fixed_duration :
+  problem -> event list -> names -> timeline -> action -> key1 list ->
+  (result * q) option option
+
+val timed_instance_ok :
+  problem -> event list -> task -> names -> timeline -> (nat -> key1 list ->
+  passage -> case_tree) -> nat -> action -> key1 list -> bool
+
+val timed_action_ok :
+  problem -> event list -> task -> names -> timeline -> (nat -> key1 list ->
+  passage -> case_tree) -> nat -> action -> bool
+
+val wait_ok :
+  problem -> event list -> task -> names -> timeline -> (nat -> case_tree) ->
+  nat -> event -> bool
+
+val is_sorted : event list -> bool
+
+val differ : atom list -> bool
+
+val timed_faithful :
+  problem -> event list -> task -> names -> timeline -> (nat -> key1 list ->
+  passage -> case_tree) -> (nat -> case_tree) -> case_tree -> bool
+
+val check_timed :
+  problem -> event list -> task -> names -> timeline -> (nat -> key1 list ->
+  passage -> case_tree) -> (nat -> case_tree) -> case_tree -> argument ->
+  (state -> positive list) -> (q * (nat * key1 list)) list -> q option -> bool

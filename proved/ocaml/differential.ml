@@ -105,8 +105,15 @@ let write_manifest directory files metric =
 (* The judge of the claim that there is no plan. *)
 let exhaustive_answer directory =
   let read name = read_file (Filename.concat directory name) in
-  match R.problem (read "domain.pddl") (read "problem.pddl") with
+  let timed_literals = ref [] in
+  match R.problem ~timed_literals (read "domain.pddl") (read "problem.pddl") with
   | exception R.Rejected _ -> "not read"
+  | problem when !timed_literals <> [] ->
+    (match Timed.task_with_events problem !timed_literals with
+     | exception R.Rejected _ -> "not read"
+     | task, events ->
+       let plans zero = Exhaustive.timed_plans zero 3 task events (R.decimal "0.001") () in
+       if plans false <> Seq.Nil then "plan" else if plans true <> Seq.Nil then "unclear" else "too large")
   | problem ->
     match Exhaustive.search false 5000 problem, Exhaustive.search true 5000 problem with
     | Exhaustive.Plan _, _ -> "plan"

@@ -118,7 +118,17 @@ end)
 type t = {
   claim : string; ground_task : C.task; names : C.names; argument : C.argument;
   labels_at : C.state -> C.positive list;     (* the labels whose variables have the values of a state *)
-  case : C.nat -> C.positive list -> C.case_tree; goal_case : C.case_tree }
+  case : C.nat -> C.positive list -> C.case_tree; goal_case : C.case_tree;
+  timeline : C.timeline; passage_case : C.nat -> C.positive list -> C.passage -> C.case_tree; wait_case : C.nat -> C.case_tree;
+  starts : C.q list }                         (* start times of the steps of the plan *)
+
+(* For timed initial literals: the atoms of the ground task that represent time, and the trees of the
+   passages of each instance and of the waits *)
+let timeline = function
+  | [denominator; phases; waited; clock] ->
+    { C.grid = C.Z.to_pos (whole denominator); phase_atoms = list atom phases; waited = atom waited; clock = fluent clock }
+  | [] -> { C.grid = C.XH; phase_atoms = []; waited = C.XH, []; clock = C.XH, [] }
+  | _ -> reject "a timeline is expected"
 
 let read action_names text =
   let sections = List.map (function List (Word name :: items) -> name, items | _ -> reject "a section is expected") (expressions text) in
@@ -136,9 +146,22 @@ let read action_names text =
         | List (name :: arguments) -> word name, List.map (fun item -> object_key (word item)) arguments
         | _ -> reject "an instance of an action is expected") tree item in
       Cases.add (name, arguments) tree map) Cases.empty (section "cases") in
+  let optional name = Option.value ~default:[] (List.assoc_opt name sections) in
+  let rec int = function C.O -> 0 | C.S n -> 1 + int n in
+  let passages = List.fold_left (fun map item -> match item with
+      | List [List (name :: arguments); passage; item] ->
+        Cases.add (word name ^ String.concat " " ("" :: List.map string_of_int (list small passage)),
+                   List.map (fun item -> object_key (word item)) arguments) (tree item) map
+      | _ -> reject "a case of a passage is expected") Cases.empty (optional "passages") in
+  let waits = Array.of_list (List.map tree (optional "waits")) in
   let rec nth names = function C.O -> List.hd names | C.S n -> nth (List.tl names) n in
   { claim = word (only "claim"); ground_task; names = names (section "names"); argument;
     labels_at = (fun state -> Option.value ~default:[] (Values.find_opt labels (values state)));
     case = (fun action arguments ->
       Option.value ~default:(C.Decided None) (Cases.find_opt (nth action_names action, arguments) cases));
-    goal_case = tree (only "goal-case") }
+    goal_case = tree (only "goal-case"); timeline = timeline (optional "timeline");
+    passage_case = (fun action arguments (((a, b), c), d) ->
+      let name = String.concat " " (nth action_names action :: List.map (fun n -> string_of_int (int n)) [a; b; c; d]) in
+      Option.value ~default:(C.Decided None) (Cases.find_opt (name, arguments) passages));
+    wait_case = (fun i -> let i = int i in if i < Array.length waits then waits.(i) else C.Decided None);
+    starts = List.map (fun item -> fraction (word item)) (optional "starts") }

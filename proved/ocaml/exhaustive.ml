@@ -73,3 +73,31 @@ let search allow_zero max_states (problem : R.problem) =
         visit ()
       end in
   visit ()
+
+(* Plans of at most [max_steps] steps for a problem with timed initial literals, with their worlds and metrics. Every
+   step starts at once, at an event or a moment after it, or such that it ends at an event or a moment after it; a
+   moment is less than half of any difference of sums of durations and times. *)
+let timed_plans allow_zero max_steps (pddl : C.problem) events moment =
+  let steps = List.concat (List.mapi (fun i action ->
+      List.map (fun env -> R.nat i, action, env) (C.instances pddl (fun _ -> false) action.C.parameters [])) pddl.C.actions) in
+  let later time = C.qred (C.qplus time moment) in
+  let at_events = List.concat_map (fun event -> [event.C.time; later event.C.time]) events in
+  let starts world now action env = match action.C.duration with
+    | None -> now :: at_events
+    | Some duration -> (match C.eval world None env duration with
+        | Some d -> now :: at_events @ List.map (fun time -> C.qred (C.qminus time d)) at_events
+        | None -> [now]) in
+  let rec extend length world now plan spent : ((C.q * (C.nat * C.positive list)) list * C.q) Seq.t = fun () ->
+    let ended = match C.timed_execute pddl events allow_zero world now spent [] with
+      | Some (world, spent) -> (match C.final_metric pddl world spent with Some metric -> Seq.return (List.rev plan, metric) | None -> Seq.empty)
+      | None -> Seq.empty in
+    let longer = if length = 0 then Seq.empty else
+      List.to_seq steps |> Seq.flat_map (fun (i, action, env) ->
+        List.to_seq (List.sort_uniq compare (List.map C.qred (starts world now action env))) |> Seq.flat_map (fun start ->
+          match C.timed_step pddl events allow_zero world now start action env with
+          | Some (next, d) ->
+            let weight = C.qplus (C.qmult pddl.C.per_time d) pddl.C.per_step in
+            extend (length - 1) (memoized next) (C.qred (C.qplus start d)) ((start, (i, env)) :: plan) (C.qred (C.qplus spent weight))
+          | None -> Seq.empty)) in
+    Seq.append ended longer () in
+  extend max_steps (C.initial pddl) R.zero [] R.zero

@@ -63,11 +63,13 @@ let mutate sections =
       repeat (n - 1) (List.mapi (fun i section -> if i = place then mutate_section section else section) sections) in
   repeat (1 + Random.int 3) sections
 
-type statement = { name : string; problem : C.problem; plan : (C.nat * C.positive list) list; claim : C.q option }
+type statement = { name : string; holds : Evidence.t -> bool }
 
-let holds statement (evidence : Evidence.t) =
-  C.check_certificate statement.problem evidence.ground_task evidence.names evidence.case evidence.goal_case evidence.argument
-    evidence.labels_at statement.plan statement.claim
+let statement name problem plan claim =
+  let holds (evidence : Evidence.t) =
+    C.check_certificate problem evidence.ground_task evidence.names evidence.case evidence.goal_case evidence.argument
+      evidence.labels_at plan claim in
+  { name; holds }
 
 (* The metric of a plan, if it can be executed. *)
 let metric problem plan = match C.execute problem false (C.initial problem) R.zero plan with
@@ -88,7 +90,7 @@ let longer_plans problem plan =
    original claim where one more action reaches the goal for nothing. *)
 let false_statements problem plan best =
   let worse = List.find_map (fun plan -> match metric problem plan with
-      | Some value when not (C.qle_bool value best) -> Some { name = "a worse plan"; problem; plan; claim = Some value }
+      | Some value when not (C.qle_bool value best) -> Some (statement "a worse plan" problem plan (Some value))
       | _ -> None) (longer_plans problem plan) in
   let rec goal_effect = function
     | C.Atom (p, terms) -> Some (C.Put (true, p, terms))
@@ -99,9 +101,9 @@ let false_statements problem plan best =
       let truth = C.Truth true in
       let action = { C.parameters = []; duration = None; at_start = truth; start_effect = effect; over_all = truth; at_end = truth;
                      end_effect = C.Nothing } in
-      [{ name = "a shortcut to the goal"; problem = { problem with C.actions = problem.C.actions @ [action] }; plan; claim = Some best }]
+      [statement "a shortcut to the goal" { problem with C.actions = problem.C.actions @ [action] } plan (Some best)]
     | _ -> [] in
-  Option.to_list worse @ [{ name = "no plan"; problem; plan = []; claim = None }] @ shortcut
+  Option.to_list worse @ [statement "no plan" problem [] None] @ shortcut
 
 (* Changed problems that have a plan, as the exhaustive search shows: that there is no plan is false for
    them. One more action reaches the goal, an action has no condition or other effects, one more atom
@@ -138,6 +140,75 @@ let solvable_problems (problem : R.problem) =
       | Exhaustive.Plan _ -> true
       | Exhaustive.No_plan | Exhaustive.Too_large -> false) candidates
 
+(* Statements about a task with timed initial literals *)
+let timed_statement name problem events plan claim =
+  let holds (evidence : Evidence.t) =
+    C.check_timed problem events evidence.ground_task evidence.names evidence.timeline evidence.passage_case evidence.wait_case
+      evidence.goal_case evidence.argument evidence.labels_at plan claim in
+  { name; holds }
+
+(* Changed tasks: an event is missing, earlier or later, or one of its literals is missing or negated; an action has a
+   condition, an effect or its duration less; one more atom holds initially; one more action reaches the goal; or the
+   goal is one atom. *)
+let changed_timed_tasks (problem : R.problem) pddl events =
+  let truth = C.Truth true in
+  let rec positive_atoms = function
+    | C.Atom (p, terms) -> [p, terms]
+    | C.And (f, g) -> positive_atoms f @ positive_atoms g
+    | _ -> [] in
+  let goal_atoms = positive_atoms pddl.C.goal_formula in
+  let each change items = List.concat (List.mapi (fun i item ->
+      List.map (fun changed -> List.concat (List.mapi (fun j other -> if i = j then changed else [other]) items)) (change item)) items) in
+  let in_order events =
+    let rec ordered = function
+      | { C.time; _ } :: ({ C.time = next; _ } :: _ as others) -> not (C.qle_bool next time) && ordered others
+      | _ -> true in
+    ordered (List.filter (fun { C.time; _ } -> not (C.qle_bool time R.zero)) events) in
+  let change_event { C.time; sets } =
+    [] :: List.map (fun delta -> [{ C.time = C.qred (C.qplus time (R.decimal delta)); sets }]) ["-2"; "-0.5"; "1"; "5"]
+    @ List.map (fun sets -> [{ C.time; sets }]) (each (fun (atom, holds) -> [[]; [atom, not holds]]) sets) in
+  let change_action action =
+    [ [{ action with C.at_start = truth }]; [{ action with C.over_all = truth }]; [{ action with C.at_end = truth }];
+      [{ action with C.start_effect = C.Nothing }]; [{ action with C.end_effect = C.Nothing }];
+      [{ action with C.duration = Option.map (fun _ -> C.Constant (R.decimal "0.5")) action.C.duration }] ] in
+  let reach_goal = List.fold_left (fun effect (p, terms) -> C.Both (effect, C.Put (true, p, terms))) C.Nothing goal_atoms in
+  let shortcut = { C.parameters = []; duration = None; at_start = truth; start_effect = reach_goal; over_all = truth; at_end = truth;
+                   end_effect = C.Nothing } in
+  let objects = List.map R.object_key problem.R.object_names in
+  let more_atoms = List.concat_map (fun (is_number, p, n) ->
+      if is_number then [] else List.map (fun arguments ->
+          { pddl with C.initial_atoms = C.add_atom (p, arguments) () pddl.C.initial_atoms }) (Exhaustive.tuples objects n))
+      (Exhaustive.changed_heads pddl) in
+  List.map (fun actions -> { pddl with C.actions }, events)
+    ((pddl.C.actions @ [shortcut]) :: each change_action pddl.C.actions)
+  @ List.map (fun task -> task, events)
+    (more_atoms @ List.map (fun (p, terms) -> { pddl with C.goal_formula = C.Atom (p, terms) }) goal_atoms)
+  @ List.map (fun events -> pddl, events) (List.filter in_order (each change_event events))
+
+let rec first n seq = if n = 0 then [] else match seq () with Seq.Nil -> [] | Seq.Cons (item, others) -> item :: first (n - 1) others
+
+(* False statements: a plan is optimal, where the search finds a better one, or there is no plan, where it finds one. *)
+let false_timed_statements problem pddl events plan claim =
+  let moment = R.decimal "0.001" and max_steps = max 2 (List.length plan) in
+  let plans (task, events) = Exhaustive.timed_plans true max_steps task events moment in
+  let is_better value (_, other) = not (C.qle_bool value other) in
+  let about name (task, events) =
+    let plans = plans (task, events) in
+    let no_plan = if first 1 plans = [] then [] else [timed_statement (name ^ ": no plan") task events [] None] in
+    let same_plan = match claim, C.timed_execute task events false (C.initial task) R.zero R.zero plan with
+      | Some _, Some (world, spent) -> (match C.final_metric task world spent with
+          | Some value when first 1 (Seq.filter (is_better value) plans) <> [] -> [timed_statement (name ^ ": the same plan") task events plan (Some value)]
+          | _ -> [])
+      | _ -> [] in
+    no_plan @ same_plan in
+  let worse = match claim with
+    | None -> []
+    | Some best ->
+      let strict = Exhaustive.timed_plans false (max_steps + 1) pddl events moment in
+      first 3 (Seq.filter (fun (_, value) -> not (C.qle_bool value best)) strict)
+      |> List.map (fun (plan, value) -> timed_statement "a worse plan" pddl events plan (Some value)) in
+  worse @ about "the original task" (pddl, events) @ List.concat_map (about "a changed task") (changed_timed_tasks problem pddl events)
+
 let read_file path =
   let channel = open_in_bin path in
   Fun.protect ~finally:(fun () -> close_in channel) (fun () -> really_input_string channel (in_channel_length channel))
@@ -146,17 +217,24 @@ let () =
   let directory = Sys.argv.(1) and count = int_of_string Sys.argv.(3) and seed = int_of_string Sys.argv.(4) in
   Random.init seed;
   let read name = read_file (Filename.concat directory name) in
-  let problem = R.problem (read "domain.pddl") (read "problem.pddl") in
+  let timed_literals = ref [] in
+  let problem = R.problem ~timed_literals (read "domain.pddl") (read "problem.pddl") in
   let evidence_text = read_file Sys.argv.(2) in
   let names = problem.R.action_names @ ["shortcut"] in
   let original = Evidence.read names evidence_text in
   let claim = R.claim problem original.claim in
-  let plan = if claim = None then [] else R.plan problem (read "plan.txt") in
-  let true_statement = { name = "the true statement"; problem = problem.R.task; plan; claim } in
-  if not (holds true_statement original) then failwith "the certificate itself is not accepted";
-  let false_statements = match claim with
-    | Some best -> false_statements problem.R.task plan best
-    | None -> List.map (fun problem -> { name = "no plan of a solvable problem"; problem; plan = []; claim = None }) (solvable_problems problem) in
+  let plan_text = if claim = None then "" else read "plan.txt" in
+  let plan = R.plan problem plan_text in
+  let true_statement, false_statements =
+    if !timed_literals <> [] then
+      let pddl, events = Timed.task_with_events problem !timed_literals in
+      let plan = List.combine original.Evidence.starts plan in
+      timed_statement "the true statement" pddl events plan claim, false_timed_statements problem pddl events plan claim
+    else
+      statement "the true statement" problem.R.task plan claim, match claim with
+      | Some best -> false_statements problem.R.task plan best
+      | None -> List.map (fun problem -> statement "no plan of a solvable problem" problem [] None) (solvable_problems problem) in
+  if not (true_statement.holds original) then failwith "the certificate itself is not accepted";
   if false_statements = [] then failwith "there is no false statement";
   let sections = R.expressions evidence_text in
   let unreadable = ref 0 and true_accepted = ref 0 and true_rejected = ref 0 in
@@ -165,13 +243,13 @@ let () =
     match Evidence.read names mutant with
     | exception (R.Rejected _ | Failure _ | Invalid_argument _ | Not_found) -> incr unreadable
     | evidence ->
-      if holds true_statement evidence then incr true_accepted else incr true_rejected;
+      if true_statement.holds evidence then incr true_accepted else incr true_rejected;
       List.iter (fun statement ->
-        if holds statement evidence then begin
+        if statement.holds evidence then begin
           Printf.printf "accepted for a false statement (%s), seed %d:\n%s\n" statement.name seed mutant; exit 1
         end) false_statements
   done;
   Printf.printf "seed %d: %d mutants, %d of them unreadable; %d accepted and %d not accepted for the true statement; none of them accepted for %s\n"
-    seed count !unreadable !true_accepted !true_rejected (match claim with
+    seed count !unreadable !true_accepted !true_rejected (if !timed_literals <> [] then Printf.sprintf "%d false statements" (List.length false_statements) else match claim with
       | Some _ -> String.concat ", " (List.map (fun s -> s.name) false_statements)
       | None -> Printf.sprintf "%d solvable problems" (List.length false_statements))

@@ -164,7 +164,7 @@ let ranges witness =
       bound "1" negated least @ bound "-1" Fun.id most
     | _ -> R.reject "a range is expected") (items witness "numbers")
 
-let names_text invariants equivalent problem task witness =
+let names_text (changing_predicates, changing_functions) invariants equivalent problem task witness =
   let names = names_of_keys () in
   let heads_of_effects =
     List.concat_map (fun action -> C.effect_heads action.C.start_effect @ C.effect_heads action.C.end_effect) problem.R.task.C.actions in
@@ -192,7 +192,7 @@ let names_text invariants equivalent problem task witness =
   let derivable = List.map (fun (p, arguments) -> list name (p :: arguments)) (derivable problem changing (List.map read_atom may_hold)) in
   let group item = list string (array item) in
   Printf.sprintf "(names %s %s %s %s %s %s %b %s %s %s %s)\n" (list Fun.id variables) (list Fun.id fluents)
-    (list Fun.id (heads "predicate")) (list Fun.id (heads "function")) (list Fun.id (may_hold @ derivable)) (list Fun.id derived) equivalent (list Fun.id invariants) (list group (items witness "exclusive"))
+    (list Fun.id (List.sort_uniq compare (heads "predicate" @ changing_predicates))) (list Fun.id (heads "function" @ changing_functions)) (list Fun.id (may_hold @ derivable)) (list Fun.id derived) equivalent (list Fun.id invariants) (list group (items witness "exclusive"))
     (number (field task "number_scale")) (number (field (field task "objective") "scale"))
 
 let integer_text number =
@@ -288,6 +288,9 @@ let search problem task names leaf candidates splits knowledge =
         C.SplitForm (form, known false form, known true (negated form)) in
   tree 0 knowledge
 
+(* The name of the action of operators that wait for a timed initial literal; no PDDL action has a blank in its name. *)
+let wait = " wait"
+
 (* Operators of an action with their arguments: an object, or the objects that may fill a slot. *)
 let operators_by_action task =
   let name item = String.lowercase_ascii (string item) in
@@ -306,7 +309,7 @@ let operators_by_action task =
         | _ -> R.reject "JSON: an argument is expected") (array (field operator "arguments")) in
     match List.nth_opt schemas (int (field operator "schema")) with
     | Some name -> Hashtbl.add by_action name (i, arguments, uses)
-    | None -> R.reject "not covered: waiting") (array (field task "operators"));
+    | None -> Hashtbl.add by_action wait (i, arguments, uses)) (array (field task "operators"));
   by_action
 
 (* The choice for which an operator is the instance with these arguments. *)
@@ -323,26 +326,143 @@ let claim_text manifest = match field manifest "claim" with
   | String "unsolvable" -> "unsolvable"
   | claim -> string (field (field claim "optimal") "metric")
 
+(* Atoms on which the preconditions and conditional effects of operators depend. *)
+let splits_of_operators ground_task names candidates =
+  List.concat_map (function
+    | Some (i, _) -> (match C.nth_error ground_task.C.operators i with
+        | Some operator ->
+          splits_of_condition names operator.C.precondition
+          @ List.concat_map (fun (literals, _) ->
+              splits_of_condition names { C.facts = List.map fst literals; clauses = []; comparisons = [] }) operator.C.conditional
+        | None -> [])
+    | None -> []) candidates
+
+(* Comparisons in the preconditions of operators. *)
+let forms_of_operators ground_task names candidates =
+  let forms = List.concat_map (function
+    | Some (i, choice) -> (match C.nth_error ground_task.C.operators i with
+        | Some operator ->
+          List.filter_map (fun linear -> C.form_of names linear operator.C.slot_sizes choice) operator.C.precondition.C.comparisons
+        | None -> [])
+    | None -> []) candidates in
+  List.map (fun form -> Form form) (List.sort_uniq compare forms)
+
+(* A common multiple of denominators *)
+let common_multiple = List.fold_left (fun multiple q ->
+  let reduced = C.qred { C.qnum = C.Zpos multiple; qden = q.C.qden } in
+  C.Z.to_pos (C.Z.mul reduced.C.qnum (C.Zpos q.C.qden))) C.XH
+
+(* The names of the atoms for phases and waits and of the clock in the ground task cannot be read; these cannot be in
+   a PDDL file. *)
+let rename_times text =
+  let replace (old, renamed) text = String.concat renamed (
+    let rec parts start i =
+      if i + String.length old > String.length text then [String.sub text start (String.length text - start)]
+      else if String.sub text i (String.length old) = old
+      then let next = i + String.length old in String.sub text start (i - start) :: parts next next
+      else parts start (i + 1) in
+    parts 0 0) in
+  List.fold_right replace ["\"(the phase ", "\"(#phase "; "\"(has waited)\"", "\"(#waited)\""; "\"(the clock)\"", "\"(#clock)\""] text
+
+(* Start times of a plan. A written time may be rounded down, to less than the end of the step before. *)
+let exact_starts task events starts plan =
+  let rec exact world now = function
+    | [] -> []
+    | (written, (i, env)) :: others ->
+      let start = if C.qle_bool now written then written else now in
+      start :: match Option.bind (C.nth_error task.C.actions i) (fun action -> C.timed_step task events true world now start action env) with
+        | Some (next, d) -> exact next (C.qred (C.qplus start d)) others
+        | None -> List.map fst others in
+  exact (C.initial task) R.zero (List.combine starts plan)
+
+(* The case trees of the passages of all instances, and of the waits *)
+let timed_cases output keys task events timeline ground_task names by_action action_names =
+  let pddl = C.extended task events timeline in
+  (* Values that a variable cannot have because their atoms never hold, for example in a task without waits *)
+  let never = List.concat_map (fun (_, atoms) -> List.map snd atoms) (C.M.elements names.C.variables)
+              |> List.filter (fun atom -> C.base_truth pddl ground_task names { C.literals = []; bounds = [] } atom = Some false) in
+  let search leaf candidates splits knowledge =
+    let knowledge = { knowledge with C.literals = List.map (fun atom -> atom, false) never @ knowledge.C.literals } in
+    let tree = search pddl ground_task names leaf candidates splits knowledge in
+    List.fold_left (fun tree atom -> C.SplitAtom (atom, C.Impossible, tree)) tree never in
+  Printf.bprintf output "(passages";
+  List.iter2 (fun name action ->
+    let instances = C.instances pddl (fun env -> C.static_false pddl names env action.C.at_start) action.C.parameters [] in
+    List.iter (fun env ->
+      let objects = List.map (fun key -> snd (Hashtbl.find keys key)) env in
+      let instance = String.concat " " (name :: objects) in
+      let candidates = List.filter_map (fun (i, arguments, uses) ->
+          Option.map (fun choice -> Some (R.nat i, choice)) (choice_for arguments uses objects)) (List.rev (Hashtbl.find_all by_action name)) in
+      match C.fixed_duration task events names timeline action env with
+      | None -> R.reject "not covered: a duration that changes: (%s)" instance
+      | Some None -> ()
+      | Some (Some (_, q)) when C.less q R.zero -> ()
+      | Some (Some (d, q)) ->
+        let formula, effect = splits_of pddl names d in
+        let splits = formula env action.C.at_start @ formula env action.C.over_all @ formula env action.C.at_end
+                     @ effect env action.C.start_effect @ effect env action.C.end_effect
+                     @ splits_of_operators ground_task names candidates @ forms_of_operators ground_task names candidates @ [Atom timeline.C.waited] in
+        List.iter (fun passage ->
+          if C.feasible events passage q then
+            match search (C.timed_leaf task events ground_task names timeline action env passage d q) (candidates @ [None]) splits
+                    (C.start_knowledge task events names timeline action env passage d q) with
+            | C.Decided None -> ()
+            | tree ->
+              let rec int = function C.O -> 0 | C.S n -> 1 + int n in
+              let ((a, b), c), e = passage in
+              Printf.bprintf output "\n((%s) %s %s)" instance (list (fun n -> string_of_int (int n)) [a; b; c; e]) (tree_text keys tree)
+            | exception No_tree -> raise (No_invariant instance)) (C.passages events)) instances)
+    action_names task.C.actions;
+  Printf.bprintf output ")\n(waits";
+  let candidates = List.rev_map (fun (i, _, uses) -> Some (R.nat i, List.map (fun _ -> C.Z0) uses)) (Hashtbl.find_all by_action wait) in
+  List.iteri (fun i event ->
+    let knowledge = C.with_invariants names { C.literals = [List.nth timeline.C.phase_atoms i, true]; bounds = [] } in
+    match search (C.wait_leaf task events ground_task names timeline (R.nat i) event) (candidates @ [None])
+            (splits_of_operators ground_task names candidates) knowledge with
+    | tree -> Printf.bprintf output "\n%s" (tree_text keys tree)
+    | exception No_tree -> raise (No_invariant "a wait")) events;
+  Buffer.add_string output ")\n"
+
 (* The evidence with these invariants *)
 let prepare_with invariants_of directory =
   let output = Buffer.create 100000 in
   let read name =
     let channel = open_in_bin (Filename.concat directory name) in
     Fun.protect ~finally:(fun () -> close_in channel) (fun () -> really_input_string channel (in_channel_length channel)) in
-  let problem = R.problem (read "domain.pddl") (read "problem.pddl") in
-  let task = json (read "task.json") in
+  let timed_literals = ref [] in
+  let problem = R.problem ~timed_literals (read "domain.pddl") (read "problem.pddl") in
+  let is_timed = !timed_literals <> [] in
+  let timed_task, events = if is_timed then Timed.task_with_events problem !timed_literals else problem.R.task, [] in
+  let read_json name = json (if is_timed then rename_times (read name) else read name) in
+  let task = read_json "task.json" in
   let argument = argument_text (json (read "argument.json")) in
   let claim_and_task = "(claim " ^ claim_text (json (read "manifest.json")) ^ ")\n" ^ task_text task in
-  let witness = json (read "witness.json") in
+  let witness = read_json "witness.json" in
+  let keys = names_of_keys () in
+  let changed_by_events = List.concat_map (fun event -> List.map (fun ((p, _), _) -> snd (Hashtbl.find keys p)) event.C.sets) events in
+  let changing = if is_timed then "#phase" :: "#waited" :: changed_by_events, ["#clock"] else [], [] in
+  let clock_range = if is_timed then ["(false (((#clock) 1)) 0)"] else [] in
   let with_names equivalent =
-    let others = claim_and_task ^ names_text (invariants_of witness) equivalent problem task witness in
+    let others = claim_and_task ^ names_text changing (clock_range @ invariants_of witness) equivalent problem task witness in
     others, Evidence.read problem.R.action_names (others ^ "(argument () () ()) (goal-case (nothing)) (cases)") in
   let follows (_, evidence) =
     let task = evidence.Evidence.ground_task in
     fst (C.ground_rules_ok problem.R.task task evidence.names task.C.layers) in
   let equivalent = with_names true in
   let others, evidence = if follows equivalent then equivalent else with_names false in
-  let ground_task = evidence.Evidence.ground_task and names = evidence.Evidence.names and pddl = problem.R.task in
+  let ground_task = evidence.Evidence.ground_task and names = evidence.Evidence.names in
+  let timeline =
+    let atom text = Evidence.atom (List.hd (R.expressions text)) in
+    let timeline = { C.grid = C.XH; phase_atoms = List.init (List.length events + 1) (fun i -> atom (Printf.sprintf "(#phase phase %d)" i));
+                     waited = atom "(#waited)"; clock = Evidence.fluent (List.hd (R.expressions "(#clock)")) } in
+    let durations = if not is_timed then [] else
+      List.concat_map (fun action ->
+        List.filter_map (fun env -> match C.fixed_duration timed_task events names timeline action env with
+          | Some (Some (_, q)) -> Some q
+          | Some None | None -> None)
+          (C.instances timed_task (fun env -> C.static_false timed_task names env action.C.at_start) action.C.parameters [])) timed_task.C.actions in
+    { timeline with C.grid = common_multiple (List.map (fun event -> event.C.time) events @ durations) } in
+  let pddl = if is_timed then C.extended timed_task events timeline else problem.R.task in
   let keys = names_of_keys () in
   let rules = C.ground_rules ground_task in
   List.iteri (fun stratum here -> List.iter (fun ((p, arguments), body) ->
@@ -359,26 +479,30 @@ let prepare_with invariants_of directory =
     with No_tree -> R.reject "no case tree is found for the goal" in
   Buffer.add_string output others;
   Buffer.add_string output argument;
-  Printf.bprintf output "(goal-case %s)\n(cases" (tree_text keys goal_case);
+  Printf.bprintf output "(goal-case %s)\n" (tree_text keys goal_case);
   let by_action = operators_by_action task in
-  List.iter2 (fun name action ->
+  if is_timed then begin
+    let atom (head, arguments) = list (fun key -> snd (Hashtbl.find keys key)) (head :: arguments) in
+    Printf.bprintf output "(timeline %s %s %s %s)\n" (integer_text (C.Zpos timeline.C.grid)) (list atom timeline.C.phase_atoms)
+      (atom timeline.C.waited) (atom timeline.C.clock);
+    if Sys.file_exists (Filename.concat directory "plan.txt") then begin
+      let text = read "plan.txt" in
+      let starts = exact_starts timed_task events (Timed.start_times text) (R.plan problem text) in
+      Printf.bprintf output "(starts %s)\n" (String.concat " " (List.map fraction_text starts))
+    end;
+    timed_cases output keys timed_task events timeline ground_task names by_action problem.R.action_names
+  end;
+  if not is_timed && Hashtbl.mem by_action wait then R.reject "not covered: waiting";
+  Buffer.add_string output "(cases";
+  if not is_timed then List.iter2 (fun name action ->
     let instances = C.instances pddl (C.pruned pddl names action) action.C.parameters [] in
     List.iter (fun env ->
       let objects = List.map (fun key -> snd (Hashtbl.find keys key)) env in
       let candidates = List.filter_map (fun (i, arguments, uses) ->
           Option.map (fun choice -> Some (R.nat i, choice)) (choice_for arguments uses objects)) (Hashtbl.find_all by_action name) in
       let formula, effect = splits_of pddl names (C.symbolic_duration pddl names action env) in
-      let operator_splits = List.concat_map (fun candidate ->
-          match candidate with
-          | Some (i, _) -> (match C.nth_error ground_task.C.operators i with
-              | Some operator ->
-                splits_of_condition names operator.C.precondition
-                @ List.concat_map (fun (literals, _) ->
-                    splits_of_condition names { C.facts = List.map fst literals; clauses = []; comparisons = [] }) operator.C.conditional
-              | None -> [])
-          | None -> []) candidates in
       let splits = formula env action.C.at_start @ formula env action.C.over_all @ formula env action.C.at_end
-                   @ effect env action.C.start_effect @ effect env action.C.end_effect @ operator_splits in
+                   @ effect env action.C.start_effect @ effect env action.C.end_effect @ splits_of_operators ground_task names candidates in
       match search (C.instance_leaf pddl ground_task names action env) (candidates @ [None]) splits
               (C.with_invariants names (C.gathered pddl ground_task names action env)) with
       | C.Decided None -> ()

@@ -108,8 +108,9 @@ type problem = { task : C.problem; maximizes : bool; action_names : string list;
 
 let negative q = C.qred (C.qminus zero q)
 
-(* [metric] replaces the metric of the problem: minimize or maximize, and an expression. *)
-let problem ?metric domain_text problem_text =
+(* [metric] replaces the metric of the problem: minimize or maximize, and an expression.
+   [timed_literals] receives the timed initial literals, the last one first; without it, they are rejected. *)
+let problem ?metric ?timed_literals domain_text problem_text =
   let sections kind text = match expressions text with
     | [List (Word "define" :: List [Word other; Word _] :: sections)] when other = kind ->
       List.map (function List (Word name :: items) -> name, items | _ -> reject "a section is expected") sections
@@ -339,10 +340,14 @@ let problem ?metric domain_text problem_text =
     applied "predicate" predicates name arguments;
     if List.mem name derived_names then reject "a derived predicate is in :init: %s" name;
     predicate_key name, ground arguments in
+  let set_at time name arguments holds = match timed_literals with
+    | Some literals -> literals := (decimal time, (atom name arguments, holds)) :: !literals
+    | None -> reject "not covered: timed initial literals" in
   let negated = ref [] in
   List.iter (function
     | List [Word "="; List (Word name :: arguments); Word value] -> set_value name arguments (decimal value)
-    | List [Word "at"; Word time; List _] when is_number time -> reject "not covered: timed initial literals"
+    | List [Word "at"; Word time; List [Word "not"; List (Word name :: arguments)]] when is_number time -> set_at time name arguments false
+    | List [Word "at"; Word time; List (Word name :: arguments)] when is_number time -> set_at time name arguments true
     | List [Word "not"; List (Word name :: arguments)] -> negated := atom name arguments :: !negated
     | List (Word name :: arguments) -> initial_atoms := C.add_atom (atom name arguments) () !initial_atoms
     | _ -> reject "not covered in :init") (section problem ":init");

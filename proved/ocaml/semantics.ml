@@ -1,5 +1,5 @@
-(* Compares the semantics of Lifted.v, with its reader, with metaplan's validator: random problems
-   and random plans. A plan without steps of duration 0 must have the same verdict and metric; a
+(* Compares the semantics of Lifted.v and Timed.v, with their readers, with metaplan's validator: random
+   problems and random plans. Every other problem has timed initial literals and no derived predicates. A plan without steps of duration 0 must have the same verdict and metric; a
    valid plan with such steps must be executable with the same metric. *)
 module C = Checker
 module R = Reader
@@ -102,18 +102,24 @@ let action i =
     form ":durative-action" [name; ":duration"; form "=" ["?duration"; duration]; ":condition"; form "and" (several 3 timed_condition);
                              ":effect"; form "and" (several 4 timed_effect)]
 
-let domain () =
-  let rules = rules () in
+let domain timed =
+  let rules = if timed then (derived := 0; []) else rules () in
   form "define" ([
     "(domain d)"; "(:requirements :adl :numeric-fluents :durative-actions)"; "(:types t1 t2 - t)"; "(:constants c - t)";
     "(:predicates (a) (b) (q ?x - t) (r ?x ?y - t) (d0 ?x - t) (d1) (d2 ?x ?y - t))"; "(:functions (total-cost) (f) (u) (g ?x - t))"; ] @ rules @ [action 0; action 1; action 2])
-let problem () =
+let event_time () = pick ["0"; "0.5"; "1"; "1"; "2"; "2"; "2.5"; "3"; "3"; "4"; "5.25"; "6"]
+let problem timed =
+  let event () =
+    let atom = changeable [] in
+    form "at" [event_time (); if chance 50 then atom else form "not" [atom]] in
+  let events = if timed then several 6 event else [] in
   let maybe text = if chance 50 then text else "" in
   let value name = if chance 20 then "" else (form "=" [name; pick ["0"; "1"; "1"; "2"; "0.5"; "-1"]]) in
   form "define" [
     "(problem p)"; "(:domain d)"; "(:objects o1 o2 - t1 o3 - t2)";
     form ":init" (["(= (total-cost) 0)"; maybe "(a)"; maybe "(b)"; value "(f)"] @ List.map (fun o -> value (form "g" [o])) objects
-                  @ List.map (fun o -> maybe (form "q" [o])) objects @ List.map (fun o -> maybe (form "r" [o; pick objects])) objects);
+                  @ List.map (fun o -> maybe (form "q" [o])) objects @ List.map (fun o -> maybe (form "r" [o; pick objects])) objects
+                  @ events);
     form ":goal" [if chance 75 then "(or (a) (not (a)))" else condition 2 [] false];
     form ":metric" ["minimize"; pick ["(total-cost)"; "(+ (total-cost) (* 2 (total-time)))"; "(total-time)"; "(+ (total-cost) (f))"]]]
 
@@ -135,15 +141,47 @@ let plan problem =
         step :: extend (length - 1) world in
   if steps = [] then [] else extend (Random.int 5) (C.initial problem)
 
-let plan_text problem plan =
+let plan_text ?(starts = []) problem plan =
   let name_of = Hashtbl.create 20 in
   List.iter (fun name -> Hashtbl.replace name_of (R.object_key name) name) problem.R.object_names;
   let rec position = function C.O -> 0 | C.S n -> 1 + position n in
-  String.concat "" (List.map (fun (i, env) ->
-      form (List.nth problem.R.action_names (position i)) (List.map (Hashtbl.find name_of) env) ^ "\n") plan)
+  let start i = match List.nth_opt starts i with Some n -> Printf.sprintf "%d.%02d: " (n / 4) (n mod 4 * 25) | None -> "" in
+  String.concat "" (List.mapi (fun position_in_plan (i, env) ->
+      start position_in_plan ^ form (List.nth problem.R.action_names (position i)) (List.map (Hashtbl.find name_of) env) ^ "\n") plan)
+
+(* With timed initial literals: steps with start times, most of which are multiples of 0.25 that are not before the end of
+   the step before *)
+let quarter n = R.decimal (Printf.sprintf "%d.%02d" (n / 4) (n mod 4 * 25))
+let timed_plan problem events =
+  let steps = List.concat (List.mapi (fun i action ->
+      List.map (fun env -> R.nat i, action, env) (C.instances problem (fun _ -> false) action.C.parameters [])) problem.C.actions) in
+  let quarters = List.init 40 Fun.id in
+  let rec extend length world now =
+    if length = 0 then []
+    else
+      let possible = List.filter (fun n -> C.qle_bool now (quarter n)) quarters in
+      let few = List.filteri (fun i _ -> i < 12) possible in
+      if few = [] then []
+      else
+        let starts = if chance 50 then [List.hd few] else few in
+        let successors = List.concat_map (fun start ->
+            List.filter_map (fun (i, action, env) ->
+              Option.map (fun (world, d) -> (start, (i, env)), world, C.qred (C.qplus (quarter start) d))
+                (C.timed_step problem events true world now (quarter start) action env)) steps) starts in
+        if successors = [] || chance 8 then
+          let i, _, env = pick steps in
+          let start = pick few in
+          (start, (i, env)) :: extend (length - 1) world (quarter start)     (* the validator sorts steps by start times *)
+        else
+          let step, world, now = pick successors in
+          step :: extend (length - 1) world now in
+  if steps = [] then [] else extend (Random.int 5) (C.initial problem) R.zero
 
 (* Verdicts: the metric of a valid plan, or none *)
 
+let metric_of problem = function
+  | Some (world, spent) -> C.final_metric problem world spent
+  | None -> None
 let verdict zero problem plan = match C.execute problem zero (C.initial problem) R.zero plan with
   | Some (world, spent) -> C.final_metric problem world spent
   | None -> None
@@ -182,26 +220,34 @@ let () =
   | [| _; metaplan; count; seed; kept |] ->
     Random.init (int_of_string seed);
     ignore (Sys.command ("mkdir -p " ^ Filename.quote kept));
-    let valid = ref 0 and invalid = ref 0 and unread = ref 0 and zero = ref 0 and different = ref 0 in
+    let timed_valid = ref 0 and valid = ref 0 and invalid = ref 0 and unread = ref 0 and zero = ref 0 and different = ref 0 in
     for i = 1 to int_of_string count do
-      let domain_text = domain () and problem_text = problem () in
-      let problem = R.problem domain_text problem_text in
+      let timed = i mod 2 = 0 in
+      let domain_text = domain timed in
+      let problem_text = problem timed in
+      let timed_literals = ref [] in
+      let problem = R.problem ~timed_literals domain_text problem_text in
+      let pddl, events = if timed then Timed.task_with_events problem !timed_literals else problem.R.task, [] in
       for j = 1 to 3 do
-        let plan = plan problem.R.task in
+        let starts, plan = if timed then List.split (timed_plan pddl events) else [], plan pddl in
+        let text = plan_text ~starts problem plan in
         let directory = Filename.concat kept (Printf.sprintf "%s-%d-%d" seed i j) in
         ignore (Sys.command ("mkdir -p " ^ Filename.quote directory));
         write_file (Filename.concat directory "domain.pddl") domain_text;
         write_file (Filename.concat directory "problem.pddl") problem_text;
-        write_file (Filename.concat directory "plan.txt") (plan_text problem plan);
-        let strict = verdict false problem.R.task plan and lenient = verdict true problem.R.task plan in
+        write_file (Filename.concat directory "plan.txt") text;
+        let verdict zero =
+          if not timed then verdict zero pddl plan
+          else metric_of pddl (C.timed_execute pddl events zero (C.initial pddl) R.zero R.zero (List.combine (Timed.start_times text) plan)) in
+        let strict = verdict false and lenient = verdict true in
         let agrees = match validate metaplan directory with
           | Unread -> incr unread; true
-          | Valid value -> incr valid; if strict = None then incr zero; (match lenient with Some other -> equal value other | None -> false)
+          | Valid value -> incr valid; if timed then incr timed_valid; if strict = None then incr zero; (match lenient with Some other -> equal value other | None -> false)
           | Invalid -> incr invalid; strict = None in
         if agrees then ignore (Sys.command ("rm -r " ^ Filename.quote directory)) else incr different
       done
     done;
-    Printf.printf "seed %s: %d valid plans (%d with steps of duration 0), %d invalid, %d not read by metaplan; %d verdicts differ\n"
-      seed !valid !zero !invalid !unread !different;
+    Printf.printf "seed %s: %d valid plans (%d with steps of duration 0, %d with timed initial literals), %d invalid, %d not read by metaplan; %d verdicts differ\n"
+      seed !valid !zero !timed_valid !invalid !unread !different;
     exit (if !different = 0 then 0 else 1)
   | _ -> prerr_endline usage; exit 2

@@ -23,7 +23,7 @@ pub struct VerifyAnswer<'a> {
 struct TheoremPart<'a> {
     /// Whether the claim follows from the theorem.
     proved: bool,
-    /// Name of the theorem in `proved/Optimal.v` or `proved/Fronts.v`; null if it does not apply.
+    /// Name of the theorem in `proved/Optimal.v`, `proved/Fronts.v` or `proved/TimelineProof.v`; null if it does not apply.
     name: Option<&'static str>,
     /// Parts that the theorem covers.
     parts: &'a [&'static str],

@@ -3,7 +3,8 @@
 //!
 //! `metaplan-proved-prepare` writes evidence for the claim and need not be trusted. One of two other programs checks
 //! the evidence with the function about which theorems are proved: `metaplan-proved-check` for a plan or its absence
-//! (theorems `optimal` and `unsolvable`), `metaplan-proved-front` for a Pareto front (theorem `front_optimal`).
+//! (theorems `optimal` and `unsolvable`, or `timed_optimal` if there are timed initial literals), and
+//! `metaplan-proved-front` for a Pareto front (theorem `front_optimal`).
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -27,6 +28,10 @@ const NOT_PROVED: i32 = 30;
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// Maximum resident memory of each program, in kilobytes of 2^10 bytes.
 const MEMORY_LIMIT: u64 = 4 << 20;
+/// Beginning of a statement about a task with timed initial literals.
+const TIMED: &str = "proved, with timed initial literals: ";
+/// Beginning of every other statement.
+const UNTIMED: &str = "proved: ";
 /// Parts of a verification that the theorem makes statements about.
 const COVERED_PARTS: [&str; 3] = ["task", "plan", "argument"];
 /// Parts of the verification of a front that the theorem makes statements about.
@@ -46,7 +51,7 @@ pub struct ProvedChecker {
 pub enum Theorem {
     /// The claim follows from a theorem.
     Holds {
-        /// Name of the theorem in `proved/Optimal.v` or `proved/Fronts.v`.
+        /// Name of the theorem in `proved/Optimal.v`, `proved/Fronts.v` or `proved/TimelineProof.v`.
         name: &'static str,
         /// The proved statement, as the program prints it.
         statement: String,
@@ -124,6 +129,7 @@ impl ProvedChecker {
                 format!("the proved checker proves something else: {statement}")
             }
             Answer::Accepted(statement) if accepted => {
+                let name = if statement.starts_with(TIMED) { "timed_optimal" } else { name };
                 let parts = report.parts.iter().map(|part| part.part);
                 let mut parts: Vec<_> = parts.filter(|part| covered.contains(part)).collect();
                 // The checks of the points of a front have the same name, which is listed once.
@@ -190,14 +196,17 @@ enum Ended {
 /// Returns `true` if the statement of the proved checker equals the claim of the certificate. They can differ,
 /// because the program takes its claim from the untrusted evidence.
 fn states(statement: &str, claim: &Claim) -> bool {
+    let Some(statement) = statement.strip_prefix(TIMED).or_else(|| statement.strip_prefix(UNTIMED)) else {
+        return false;
+    };
     match claim {
-        Claim::Unsolvable => statement == "proved: there is no plan",
+        Claim::Unsolvable => statement == "there is no plan",
         Claim::Front(front) => {
             let values: Vec<_> = front.points.iter().map(|values| values.join(" ")).collect();
-            statement == format!("proved: the front has exactly these values: {}", values.join(", "))
+            statement == format!("the front has exactly these values: {}", values.join(", "))
         }
         Claim::Optimal { metric } => statement
-            .strip_prefix("proved: the plan of ")
+            .strip_prefix("the plan of ")
             .and_then(|text| text.strip_suffix(&format!(" steps is optimal, metric {metric}")))
             .is_some_and(|count| count.parse::<usize>().is_ok()),
     }
@@ -273,6 +282,10 @@ mod tests {
             &metric("8")
         ));
         assert!(states("proved: there is no plan", &Claim::Unsolvable));
+        let timed = "proved, with timed initial literals: ";
+        assert!(states(&format!("{timed}there is no plan"), &Claim::Unsolvable));
+        assert!(states(&format!("{timed}the plan of 2 steps is optimal, metric 3.5"), &metric("3.5")));
+        assert!(!states(&format!("{timed}the plan of 2 steps is optimal, metric 3.5"), &metric("3")));
         assert!(!states("proved: there is no plan", &metric("8")));
     }
 }
