@@ -16,6 +16,9 @@ pub struct Thresholds {
     /// Number of work units after which, of two alternating A\* searches, a search whose lower bound lags behind gets
     /// only half of its share.
     pub behind: u64,
+    /// Number of work units of each of two alternating A\* searches after which abstractions are computed for online
+    /// cost partitioning.
+    pub partitioning: u64,
     /// Number of states after which stubborn sets are disabled if they have pruned too little.
     pub stubborn: u64,
     /// Number of evaluated states after which the satisficing search computes h² mutexes.
@@ -46,6 +49,7 @@ impl Default for Thresholds {
             states: 20_000,
             progress: 200_000,
             behind: 6_000_000_000,
+            partitioning: 200_000_000,
             stubborn: 1_000,
             pairs: 3_000,
             front: 24,
@@ -65,6 +69,7 @@ impl Thresholds {
         states: 0,
         progress: 0,
         behind: 0,
+        partitioning: 0,
         stubborn: u64::MAX,
         pairs: 0,
         front: 0,

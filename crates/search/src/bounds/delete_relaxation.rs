@@ -129,6 +129,41 @@ impl DeleteRelaxation {
         self.required_by.len()
     }
 
+    /// Returns the number of a fact of a basic variable.
+    #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
+    pub(super) fn fact(&self, fact: Fact) -> u32 {
+        self.first[fact.variable.index()] + fact.value
+    }
+
+    /// Returns, for each fact, whether it is reachable from a state if the fact `excluded` never holds. Also
+    /// returns the number of visited rules.
+    pub(super) fn reachable_without(&self, values: &[u32], excluded: Option<u32>) -> (Vec<bool>, u64) {
+        let mut reachable = vec![false; self.facts()];
+        let mut unreached: Vec<u32> =
+            (0..dense(self.payers.len())).map(|rule| dense(self.required.list(rule).len())).collect();
+        let mut visits = unreached.len() as u64;
+        let mut open: Vec<u32> = self.state(values).filter(|fact| Some(*fact) != excluded).collect();
+        for fact in &open {
+            reachable[*fact as usize] = true;
+        }
+        while let Some(fact) = open.pop() {
+            for rule in self.required_by.list(fact) {
+                visits = visits.saturating_add(1);
+                let count = &mut unreached[*rule as usize];
+                *count = count.saturating_sub(1);
+                if *count > 0 {
+                    continue;
+                }
+                for given in self.given.list(*rule) {
+                    if Some(*given) != excluded && !std::mem::replace(&mut reachable[*given as usize], true) {
+                        open.push(*given);
+                    }
+                }
+            }
+        }
+        (reachable, visits)
+    }
+
     /// Returns the facts that hold in a state, without derived variables, followed by `ALWAYS`.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
     pub(super) fn state<'s>(&'s self, values: &'s [u32]) -> impl Iterator<Item = u32> + 's {

@@ -9,13 +9,18 @@
 //!
 //! \[1\] S. Edelkamp: Planning with pattern databases, ECP 2001.
 
+mod abstraction;
+mod cartesian;
 mod cost_partitioning;
 mod delete_relaxation;
+mod fact_landmarks;
 mod lm_cut;
+mod online_cost_partitioning;
 mod pattern_database;
 mod resources;
 
 pub use lm_cut::{LandmarkCut, landmark_cut_bound};
+pub use online_cost_partitioning::OnlineCostPartitioning;
 pub use pattern_database::Projection;
 
 use cost_partitioning::CostPartitioning;
@@ -157,6 +162,21 @@ impl Bounds {
             best = self.partitions.iter().map(|partition| partition.estimate(&states)).fold(best, Int::max);
         }
         Some(best)
+    }
+
+    /// Computes a heuristic for A\* that improves during the search: online saturated cost partitioning over
+    /// projections and Cartesian abstractions. `max_work` limits the effort for the Cartesian abstractions.
+    /// Returns `None` if every abstraction yields 0 for all states.
+    ///
+    /// # Errors
+    /// Fails if the deadline has passed or the interrupt flag is set.
+    pub fn online_cost_partitioning(
+        &self,
+        context: Context<'_>,
+        max_work: u64,
+    ) -> Result<Option<OnlineCostPartitioning>, Interrupted> {
+        let _span = info_span!("abstractions").entered();
+        OnlineCostPartitioning::new(context, self.projections.iter().chain(&self.further), max_work)
     }
 
     /// Returns lower bounds on the resources that a state must have to reach the goal or an operator that may

@@ -108,6 +108,21 @@ impl Projection {
         ranges.map(move |((operator, end), start)| (*operator, &self.transitions[start..*end]))
     }
 
+    /// Returns all stored transitions, each with its operator.
+    pub(super) fn all_transitions(&self) -> impl Iterator<Item = (usize, Transition)> {
+        self.by_operator().flat_map(|(operator, transitions)| transitions.iter().map(move |t| (operator, *t)))
+    }
+
+    /// Returns the variables of the pattern, each with the number of its values.
+    pub(super) fn pattern_sizes(&self) -> impl Iterator<Item = (u32, u32)> {
+        self.pattern.iter().zip(&self.sizes).map(|(variable, size)| (variable.0, dense(*size)))
+    }
+
+    /// Returns the abstract goal states.
+    pub(super) fn goals(&self) -> &[u32] {
+        &self.goals
+    }
+
     /// Returns the position of an operator in `operators`, or `None` if it has no transitions.
     fn place(&self, operator: usize) -> Option<usize> {
         self.operators.binary_search_by_key(&operator, |(candidate, _)| *candidate).ok()

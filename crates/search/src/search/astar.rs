@@ -14,6 +14,8 @@
 //! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem
 //! with time windows, INFOR 26(3), 1988.
 
+use std::cell::RefCell;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use task::context::Context;
@@ -36,6 +38,10 @@ use crate::search::symmetry::Orbits;
 const EXPANSION_COST: u64 = 2_000;
 /// Work units charged for generating a successor: applying the operator and looking the state up.
 const GENERATION_COST: u64 = 600;
+/// Number of evaluations of an improving heuristic after which it is no longer used if it raised too few f values.
+const IMPROVING_TRIAL: u64 = 5_000;
+/// An improving heuristic must raise this part of the evaluated f values, as a divisor.
+const IMPROVING_SHARE: u64 = 25;
 /// Work units charged for each operator that the stubborn-set computation visits.
 const STUBBORN_SET_COST: u64 = 10;
 
@@ -109,6 +115,11 @@ pub struct AStar<'a, N, E> {
     order: OpenListOrder,
     /// More accurate heuristic that is evaluated only when a node is about to be expanded (lazy A\*).
     pub(super) lazy_heuristic: Option<Box<dyn LazyHeuristic<N>>>,
+    /// Heuristic that improves during the search, shared with other searches. It is evaluated whenever a node is
+    /// about to be expanded, before the lazy heuristic.
+    pub(super) improving_heuristic: Option<SharedHeuristic<N>>,
+    /// Numbers of evaluations of the improving heuristic, and of raised f values, in the current trial.
+    trial: (u64, u64),
     pub(super) pruning: Option<StubbornSetPruning>,
     /// Work units without those of the lazy heuristic.
     own_work: u64,
@@ -135,6 +146,9 @@ pub struct AStar<'a, N, E> {
     state: State<N>,
     next: State<N>,
 }
+
+/// A heuristic that several searches of a task evaluate in turns.
+pub(super) type SharedHeuristic<N> = Rc<RefCell<Box<dyn LazyHeuristic<N>>>>;
 
 /// Progress callback. Receives the upper bound on the plan cost, if any (the cost of the best known plan, or
 /// a limit set by the caller), and the lower bound on the cost of every plan.
@@ -168,6 +182,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             states_dropped: false,
             order,
             lazy_heuristic: None,
+            improving_heuristic: None,
+            trial: (0, 0),
             pruning: None,
             own_work: 0,
             sharing: 1,
@@ -265,29 +281,63 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// Evaluates the lazy heuristic for a node that is about to be expanded. Returns the key of the node, or
-    /// `None` if the node was pruned or reinserted with a higher key.
+    /// Evaluates the more accurate heuristics for a node that is about to be expanded. Returns the key of the node,
+    /// or `None` if the node was pruned or reinserted with a higher key.
     fn reevaluate(&mut self, id: u32, key: NodeKey<N>) -> Option<NodeKey<N>> {
+        if let Some(improving) = &self.improving_heuristic {
+            let mut heuristic = improving.borrow_mut();
+            let before = heuristic.work();
+            let estimate = heuristic.estimate(&self.state);
+            let work = heuristic.work().saturating_sub(before);
+            drop(heuristic);
+            self.own_work = self.own_work.saturating_add(work);
+            let is_raised = estimate.is_none_or(|estimate| self.is_raised(id, &key, &estimate));
+            self.end_trial(is_raised);
+            if is_raised {
+                return None;
+            }
+        }
         let Some(sharper) = &mut self.lazy_heuristic else { return Some(key) };
         if !self.store.mark_reevaluated(id) {
             return Some(key);
         }
         let estimate = sharper.estimate(&self.state)?;
-        let Some(total) = self.store.cost(id).plus(&estimate) else {
+        if self.is_raised(id, &key, &estimate) { None } else { Some(key) }
+    }
+
+    /// Counts an evaluation of the improving heuristic. Stops using the heuristic if it raised too few f values,
+    /// because evaluations cost time.
+    #[expect(clippy::arithmetic_side_effects, reason = "counters that are reset after `IMPROVING_TRIAL`")]
+    fn end_trial(&mut self, is_raised: bool) {
+        let (evaluations, raised) = &mut self.trial;
+        *evaluations += 1;
+        *raised += u64::from(is_raised);
+        if *evaluations == IMPROVING_TRIAL {
+            if *raised < IMPROVING_TRIAL / IMPROVING_SHARE {
+                self.improving_heuristic = None;
+            }
+            self.trial = (0, 0);
+        }
+    }
+
+    /// Returns `true` if a heuristic value raises the f value of a node. Then the node is inserted again with a
+    /// higher key, unless it cannot improve the incumbent.
+    fn is_raised(&mut self, id: u32, key: &NodeKey<N>, estimate: &N) -> bool {
+        let Some(total) = self.store.cost(id).plus(estimate) else {
             self.states_dropped = true;
-            return None;
+            return true;
         };
         if total <= key.0 {
-            return Some(key);
+            return false;
         }
         let steps = self.store.origin(id).steps;
-        let to_go = self.prepared.steps_at_least(&estimate);
+        let to_go = self.prepared.steps_at_least(estimate);
         let least = steps.saturating_add(to_go);
         if !self.exceeds_upper_bound(&total) && !self.is_dominated_by_incumbent(&total, least) {
             let rank = if self.order == OpenListOrder::Nearest { to_go } else { key.1.max(least) };
             self.open.push((total, rank, key.2), id);
         }
-        None
+        true
     }
 
     pub(super) fn work(&self) -> u64 {
@@ -360,7 +410,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
     }
 
     fn has_memory(&self) -> bool {
-        self.store.bytes().saturating_add(self.open.bytes()) <= self.room()
+        let improving = self.improving_heuristic.as_ref();
+        let shared = improving.map_or(0, |heuristic| heuristic.borrow().bytes());
+        self.store.bytes().saturating_add(self.open.bytes()).saturating_add(shared) <= self.room()
     }
 
     /// Returns `false` if the lower bound is not expected to reach the upper bound on the plan cost

@@ -5,11 +5,14 @@
 //!
 //! In `search`, A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search
 //! looks for some plan. Then two A\* searches alternate: one uses only pattern databases, the other also
-//! LM-cut. The LM-cut search first gets a quarter of the other's work, and later the same work. A search then
+//! LM-cut. After some work, both also use online cost partitioning, which they share, because the computation of
+//! its abstractions would take longer than most proofs. The LM-cut search first gets a quarter of the other's work, and later the same work. A search then
 //! gets only half of its work if its lower bound lags behind that of the other, or if its memory may not
 //! suffice. The result of the search that finishes first is returned. Work is counted in units instead of
 //! time, so the result without a time limit is deterministic.
 
+use std::cell::RefCell;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use task::context::Context;
@@ -153,6 +156,8 @@ pub struct InterleavedSearch<'a, N, E> {
     initial: State<N>,
     searches: Vec<AStar<'a, N, E>>,
     has_begun: bool,
+    /// `true` if the improving heuristic was computed, or is not available.
+    has_improving: bool,
     /// `true` if searches continue although memory is forecast to run out.
     is_patient: bool,
     bound: Option<N>,
@@ -168,6 +173,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
             initial: initial.clone(),
             searches,
             has_begun: false,
+            has_improving: false,
             is_patient: false,
             bound: None,
             best: None,
@@ -227,6 +233,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         let count = self.searches.len();
         let mut ended = Vec::new();
         let thresholds = self.space.context.limits.thresholds();
+        if !self.has_improving && until >= thresholds.partitioning {
+            self.add_improving_heuristic(until);
+        }
         let behind = if until >= thresholds.behind { lagging_search(&self.searches) } else { None };
         for position in 0..count {
             let bound = &mut self.bound;
@@ -276,6 +285,18 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         }
         // No search can be resumed, so the result is the best plan without a proof.
         self.searches.is_empty().then(|| SearchOutcome::Unknown(self.best.clone()))
+    }
+
+    /// Adds the heuristic that improves during the search to all searches. `work` is the budget of this round; its
+    /// computation may cost half of it.
+    fn add_improving_heuristic(&mut self, work: u64) {
+        self.has_improving = true;
+        let SearchProblem { context, bounds, .. } = self.space;
+        let Some(improving) = bounds.improving(context, work / 2) else { return };
+        let shared = Rc::new(RefCell::new(improving));
+        for search in &mut self.searches {
+            search.improving_heuristic = Some(Rc::clone(&shared));
+        }
     }
 
     /// Adds the LM-cut search, symmetry reduction and stubborn sets, as far as they are available.
@@ -390,7 +411,7 @@ mod tests {
     fn solve(
         task: &Task,
         order: OpenListOrder,
-        [sharp, exchanged, chosen]: [bool; 3],
+        [sharp, exchanged, chosen, improving]: [bool; 4],
     ) -> Option<(Int, usize)> {
         let limits = Limits::none();
         let context = Context::new(task, &limits);
@@ -401,6 +422,10 @@ mod tests {
         let mut search = AStar::new(&space, &task.initial, order, None);
         search.lazy_heuristic = if sharp { bounds.sharper(task) } else { None };
         let stubborn = if chosen { Stubborn::new(task) } else { None };
+        if improving {
+            let improving = bounds.improving(context, 100_000);
+            search.improving_heuristic = improving.map(|improving| Rc::new(RefCell::new(improving)));
+        }
         search.pruning = stubborn.map(|stubborn| StubbornSetPruning::new(Arc::new(stubborn), 1_000));
         match search.run_until_states(usize::MAX, &mut |_, _| {}) {
             Some(SearchOutcome::Optimal(plan)) => Some((plan.cost, plan.steps.len())),
@@ -417,9 +442,9 @@ mod tests {
             return false;
         }
         let cheapest = optimum(&task);
-        let plain = solve(&task, OpenListOrder::Fewest, [false; 3]);
+        let plain = solve(&task, OpenListOrder::Fewest, [false; 4]);
         assert_eq!(plain.map(|(cost, _)| cost), cheapest, "{text:?}");
-        for ways in (1..8).map(|ways| [ways & 1, ways & 2, ways & 4].map(|way| way > 0)) {
+        for ways in (1..16).map(|ways| [1, 2, 4, 8].map(|way| ways & way > 0)) {
             let fewest = solve(&task, OpenListOrder::Fewest, ways);
             assert_eq!(fewest, plain, "{ways:?}: {text:?}");
             let nearest = solve(&task, OpenListOrder::Nearest, ways);

@@ -1,0 +1,352 @@
+//! Online saturated cost partitioning \[1\] over projections and Cartesian abstractions, for A\*.
+//!
+//! The abstractions are computed once, after a search has worked for some time. During the search, an order of
+//! the abstractions is computed now and then for the state that is being evaluated, whose estimate is low,
+//! because A\* expands states by increasing estimates of the plan cost. The cost partitioning of the order is kept
+//! if it raises the estimate of this state. The heuristic value is the maximum over all kept cost
+//! partitionings. The effort for new orders is limited to a part of the effort for evaluations.
+//!
+//! Each order is used twice \[2\]: first for the distances up to the distance of the state, so that abstractions
+//! do not use costs for states that are farther from the goal, and then for the remaining costs.
+//!
+//! \[1\] J. Seipp: Online saturated cost partitioning for classical planning, ICAPS 2021.
+//!
+//! \[2\] J. Seipp, M. Helmert: Subset-saturated cost partitioning for optimal classical planning, ICAPS 2019.
+
+use num_integer::Integer;
+use task::context::Context;
+use task::limits::{Interrupted, Limits};
+use task::number::Int;
+use task::task::Task;
+
+use crate::bounds::abstraction::{Abstraction, MAX_ABSTRACTIONS, MAX_DISTANCE, Scratch, UNREACHABLE};
+use crate::bounds::cartesian::{RefinementLimits, Subtask, cartesian_abstraction, operators_by_effect};
+use crate::bounds::fact_landmarks::fact_landmarks;
+use crate::bounds::pattern_database::Projection;
+
+/// Upper limit on the number of transitions of all abstractions together.
+const MAX_TRANSITIONS: usize = 1_000_000;
+/// Upper limit on the number of transitions of a projection. Greater projections are omitted.
+const MAX_PROJECTION_SIZE: usize = 100_000;
+/// Upper limit on the number of kept cost partitionings.
+const MAX_PARTITIONINGS: usize = 128;
+/// The goal distances of all cost partitionings may take this part of the memory limit of a search, as a divisor.
+const TABLE_SHARE: usize = 8;
+/// Work units to visit a transition or an abstract state in the computation of goal distances.
+const WORK_PER_VISIT: u64 = 10;
+/// Work units of an evaluation, for each abstraction.
+const WORK_PER_ABSTRACTION: u64 = 20;
+/// An order may cost this part of the work for evaluations and expansions since the last order, as a divisor.
+const ORDER_SHARE: u64 = 4;
+/// Work units of A\* for each evaluated state, approximately.
+const WORK_PER_EVALUATION: u64 = 5_000;
+
+/// Heuristic for A\* that improves while it is evaluated.
+pub struct OnlineCostPartitioning {
+    abstractions: Vec<Abstraction>,
+    costs: Vec<u32>,
+    /// Greatest common divisor of the operator costs. `costs` and distances are multiples of it.
+    unit: Int,
+    /// For each abstraction: for each abstract state, a row of `stride` goal distances. The first is the distance
+    /// under the full costs, the others under the shares of cost partitionings.
+    tables: Vec<Vec<u32>>,
+    stride: usize,
+    partitionings: usize,
+    /// For each abstraction: whether it detects dead ends, or has a share of a kept cost partitioning. Others are
+    /// evaluated only for new orders.
+    is_active: Vec<bool>,
+    /// For each abstraction: the costs that it needs and that other abstractions need, too.
+    stolen: Vec<u64>,
+    limits: Limits,
+    scratch: Scratch,
+    sums: Vec<u32>,
+    work: u64,
+    /// Work units of the computation of an order.
+    order_work: u64,
+    evaluations: u64,
+    next_order: u64,
+    /// Number of orders since the last one that was kept.
+    failures: u32,
+}
+
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "counts of what is in memory, and sums of at most MAX_ABSTRACTIONS distances of at most MAX_DISTANCE"
+)]
+impl OnlineCostPartitioning {
+    /// Computes the abstractions, with at most about `max_work` work units for the Cartesian abstractions.
+    /// Returns `None` if no abstraction is useful.
+    pub(super) fn new<'p>(
+        context: Context<'_>,
+        projections: impl Iterator<Item = &'p Projection>,
+        max_work: u64,
+    ) -> Result<Option<Self>, Interrupted> {
+        let Context { task, limits } = context;
+        let (costs, unit) = scaled_costs(task);
+        let mut scratch = Scratch::new(costs.len());
+        let mut pulse = limits.pulse();
+        let mut abstractions: Vec<Abstraction> = Vec::new();
+        let mut work = 0;
+        let mut remaining = MAX_TRANSITIONS;
+        let by_effect = operators_by_effect(task);
+        let subtasks = subtasks(context)?;
+        let count = subtasks.len();
+        for (subtask, position) in subtasks.iter().zip(0..) {
+            let others = count - position;
+            let share = max_work.saturating_sub(work) / others as u64;
+            let refinement = RefinementLimits { transitions: remaining / others, work: share };
+            let (abstraction, used) =
+                cartesian_abstraction(context, &costs, &by_effect, subtask, refinement)?;
+            remaining = remaining.saturating_sub(abstraction.size());
+            work += used;
+            abstractions.push(abstraction);
+        }
+        let small = projections.filter(|projection| projection.transition_count() <= MAX_PROJECTION_SIZE);
+        let free = MAX_ABSTRACTIONS - abstractions.len();
+        for projection in small.take(free) {
+            let abstraction = Abstraction::of_projection(projection);
+            if abstraction.size() > remaining {
+                break;
+            }
+            remaining -= abstraction.size();
+            abstractions.push(abstraction);
+        }
+        let mut alone = Vec::new();
+        let mut distances = Vec::new();
+        for abstraction in &abstractions {
+            abstraction.goal_distances(&costs, &mut distances, &mut scratch, &mut pulse)?;
+            alone.push(distances.clone());
+        }
+        // An abstraction in which every distance is 0 is useless.
+        let is_useful: Vec<bool> = alone.iter().map(|row| row.iter().any(|cost| *cost > 0)).collect();
+        let mut useful = is_useful.iter();
+        abstractions.retain(|_| useful.next() == Some(&true));
+        let mut useful = is_useful.iter();
+        alone.retain(|_| useful.next() == Some(&true));
+        if abstractions.is_empty() {
+            return Ok(None);
+        }
+        let is_active = alone.iter().map(|row| row.contains(&UNREACHABLE)).collect();
+        let stolen = stolen_costs(&abstractions, &alone, &costs, &mut scratch);
+        let visits: usize = abstractions.iter().map(Abstraction::size).sum();
+        let order_work = visits as u64 * 2 * WORK_PER_VISIT;
+        let mut partitioning = Self {
+            abstractions,
+            costs,
+            unit,
+            tables: alone,
+            stride: 1,
+            partitionings: 0,
+            is_active,
+            stolen,
+            limits: limits.clone(),
+            scratch,
+            sums: Vec::new(),
+            work: work + order_work,
+            order_work,
+            evaluations: 0,
+            next_order: 0,
+            failures: 0,
+        };
+        partitioning.estimate(&task.initial.values);
+        Ok(Some(partitioning))
+    }
+
+    /// Returns a lower bound on the cost from a state to the goal, or `None` if the goal is proved unreachable.
+    pub fn estimate(&mut self, values: &[u32]) -> Option<Int> {
+        self.evaluations += 1;
+        let mut sums = std::mem::take(&mut self.sums);
+        sums.clear();
+        sums.resize(self.stride - 1, 0);
+        let mut is_reachable = true;
+        let tables = self.abstractions.iter().zip(&self.tables);
+        for ((abstraction, table), _) in tables.zip(&self.is_active).filter(|(_, is_active)| **is_active) {
+            let (state, steps) = abstraction.state(values);
+            self.work += WORK_PER_ABSTRACTION + u64::from(steps) + self.stride as u64 / 4;
+            let row = &table[state as usize * self.stride..(state as usize + 1) * self.stride];
+            is_reachable &= row[0] != UNREACHABLE;
+            for (sum, distance) in sums.iter_mut().zip(&row[1..]) {
+                *sum += distance;
+            }
+        }
+        let mut result = None;
+        if is_reachable {
+            let mut best = sums[..self.partitionings].iter().copied().fold(0, u32::max);
+            if self.evaluations >= self.next_order {
+                best = best.max(self.try_order(values, best));
+            }
+            result = Some(Int::from(best) * self.unit);
+        }
+        self.sums = sums;
+        result
+    }
+
+    /// Returns the work units already done, including those for the abstractions.
+    pub(crate) fn work(&self) -> u64 {
+        self.work
+    }
+
+    /// Returns the memory of the goal distances and abstractions, in bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        let tables: usize = self.tables.iter().map(Vec::len).sum();
+        let transitions: usize = self.abstractions.iter().map(Abstraction::size).sum();
+        tables * size_of::<u32>() + transitions * size_of::<(u32, u32)>()
+    }
+
+    /// Returns the number of kept cost partitionings.
+    pub fn partitionings(&self) -> usize {
+        self.partitionings
+    }
+
+    /// Computes the cost partitioning of an order for a state from which no abstraction proves the goal
+    /// unreachable, and keeps it if it raises the estimate. Returns its estimate.
+    fn try_order(&mut self, values: &[u32], estimate: u32) -> u32 {
+        let rows: usize = self.abstractions.iter().map(Abstraction::len).sum();
+        let is_full = self.partitionings + 1 >= self.stride
+            && rows.saturating_mul(self.stride * 2).saturating_mul(size_of::<u32>())
+                > self.limits.room() / TABLE_SHARE;
+        if self.partitionings >= MAX_PARTITIONINGS || is_full {
+            self.next_order = u64::MAX;
+            return 0;
+        }
+        self.work += self.order_work;
+        let states = self.abstractions.iter().map(|abstraction| abstraction.state(values).0);
+        let states: Vec<u32> = states.collect();
+        let Ok((tables, value)) = self.partition(&states) else { return 0 };
+        let is_better = value > estimate;
+        self.failures = if is_better { 0 } else { (self.failures + 1).min(10) };
+        let pause = (self.order_work * ORDER_SHARE / WORK_PER_EVALUATION).max(1) << self.failures;
+        self.next_order = self.evaluations.saturating_add(pause);
+        if is_better {
+            self.keep(&tables);
+        }
+        value
+    }
+
+    /// Computes the cost partitioning of an order for the given abstract states: the goal distances of each
+    /// abstraction, and the sum of those of the given states.
+    fn partition(&mut self, states: &[u32]) -> Result<(Vec<Vec<u32>>, u32), Interrupted> {
+        let mut pulse = self.limits.pulse();
+        let mut remaining = self.costs.clone();
+        let mut tables: Vec<Vec<u32>> = vec![Vec::new(); self.abstractions.len()];
+        let order = self.order(states);
+        let mut distances = Vec::new();
+        let mut value = 0;
+        for is_perimeter in [true, false] {
+            for position in &order {
+                let (abstraction, state) = (&self.abstractions[*position], states[*position]);
+                abstraction.goal_distances(&remaining, &mut distances, &mut self.scratch, &mut pulse)?;
+                if is_perimeter {
+                    // Distances of other states are capped at the distance of this state.
+                    let distance = distances[state as usize];
+                    let finite = distances.iter_mut().filter(|other| **other != UNREACHABLE);
+                    finite.for_each(|other| *other = distance.min(*other));
+                }
+                let use_cost = |operator: usize, used: u32| {
+                    remaining[operator] = remaining[operator].saturating_sub(used);
+                };
+                abstraction.saturate(&distances, &mut self.scratch, use_cost);
+                let table = &mut tables[*position];
+                table.resize(distances.len(), 0);
+                for (sum, distance) in table.iter_mut().zip(&distances) {
+                    if *distance != UNREACHABLE {
+                        *sum = (*sum + distance).min(MAX_DISTANCE);
+                    }
+                }
+            }
+        }
+        for (table, state) in tables.iter().zip(states) {
+            value += table[*state as usize];
+        }
+        Ok((tables, value))
+    }
+
+    /// Returns the abstractions, sorted by decreasing ratio of the goal distance of a state to the costs that
+    /// the abstraction takes from others.
+    fn order(&self, states: &[u32]) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.abstractions.len()).collect();
+        let distance = |position: usize| self.tables[position][states[position] as usize * self.stride];
+        order.sort_by_cached_key(|position| {
+            // Scaled, so that the quotient is precise enough.
+            let yielded = u128::from(distance(*position)) << 64;
+            std::cmp::Reverse(yielded / u128::from(self.stolen[*position] + 1))
+        });
+        order
+    }
+
+    fn keep(&mut self, columns: &[Vec<u32>]) {
+        let (old, column) = (self.stride, self.partitionings + 1);
+        if column >= old {
+            self.stride = (old * 2).max(8);
+            for table in &mut self.tables {
+                let mut wider = vec![0; table.len() / old * self.stride];
+                for (row, to) in table.chunks(old).zip(wider.chunks_mut(self.stride)) {
+                    to[..old].copy_from_slice(row);
+                }
+                *table = wider;
+            }
+        }
+        for ((table, distances), is_active) in self.tables.iter_mut().zip(columns).zip(&mut self.is_active) {
+            *is_active |= distances.iter().any(|distance| *distance > 0);
+            for (row, distance) in table.chunks_mut(self.stride).zip(distances) {
+                row[column] = *distance;
+            }
+        }
+        self.partitionings = column;
+    }
+}
+
+/// Returns the operator costs as multiples of the returned unit, at most `MAX_DISTANCE` each.
+fn scaled_costs(task: &Task) -> (Vec<u32>, Int) {
+    let costs: Vec<Int> = task.operators.iter().map(|operator| operator.cost.minimum().max(0)).collect();
+    let unit = costs.iter().fold(0, |divisor: Int, cost| divisor.gcd(cost)).max(1);
+    let scaled = costs.iter().map(|cost| {
+        let cost = cost.checked_div(unit).unwrap_or(0);
+        u32::try_from(cost).unwrap_or(MAX_DISTANCE).min(MAX_DISTANCE)
+    });
+    (scaled.collect(), unit)
+}
+
+/// Returns a subtask for each goal fact and each fact landmark, at most half of `MAX_ABSTRACTIONS`.
+fn subtasks(context: Context<'_>) -> Result<Vec<Subtask>, Interrupted> {
+    let task = context.task;
+    let goals = task.goal.facts.iter().filter(|fact| fact.variable.index() < task.basic);
+    let mut subtasks: Vec<Subtask> =
+        goals.map(|fact| Subtask { goals: vec![*fact], unreachable: Vec::new() }).collect();
+    let landmarks = fact_landmarks(context)?;
+    subtasks.extend(
+        landmarks
+            .into_iter()
+            .map(|landmark| Subtask { goals: vec![landmark.fact], unreachable: landmark.later_facts }),
+    );
+    subtasks.truncate(MAX_ABSTRACTIONS / 2);
+    Ok(subtasks)
+}
+
+/// Returns, for each abstraction, the sum over all operators of the cost that the abstraction needs and that is then
+/// missing for the other abstractions. `distances` are the goal distances under the full costs.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "sums over operators and abstractions in memory, of numbers below MAX_DISTANCE"
+)]
+fn stolen_costs(
+    abstractions: &[Abstraction],
+    distances: &[Vec<u32>],
+    costs: &[u32],
+    scratch: &mut Scratch,
+) -> Vec<u64> {
+    let mut needed = vec![0_u64; costs.len()];
+    for (abstraction, distances) in abstractions.iter().zip(distances) {
+        abstraction.saturate(distances, scratch, |operator, used| needed[operator] += u64::from(used));
+    }
+    let stolen = |(abstraction, distances): (&Abstraction, &Vec<u32>)| {
+        let mut sum = 0;
+        abstraction.saturate(distances, scratch, |operator, used| {
+            let others = needed[operator] - u64::from(used);
+            let missing = needed[operator].saturating_sub(u64::from(costs[operator]));
+            sum += u64::from(used).min(others).min(missing);
+        });
+        sum
+    };
+    abstractions.iter().zip(distances).map(stolen).collect()
+}
