@@ -63,11 +63,12 @@ const SUITES: [(&str, &[Oracle]); 2] = [
 ];
 
 /// Tests that run for each fault of the planner, in this order, until one fails.
-const ORACLES: [Oracle; 10] = [
+const ORACLES: [Oracle; 11] = [
     (Tests::Oracle, "field::", 0),
     (Tests::Planta, "random::", 0),
     (Tests::Oracle, "front::", 300),
     (Tests::Unit, "search::", 0),
+    (Tests::Unit, "bounds::", 0),
     (Tests::Oracle, "numbers::special::hundreds_of_designs", 0),
     (Tests::Oracle, "temporal::actions_one_after_another", 4_000),
     (Tests::Oracle, "temporal::actions_with_designs", 3_000),

@@ -153,7 +153,7 @@ impl OnlineCostPartitioning {
     }
 
     /// Returns a lower bound on the cost from a state to the goal, or `None` if the goal is proved unreachable.
-    pub fn estimate(&mut self, values: &[u32]) -> Option<Int> {
+    pub(crate) fn estimate(&mut self, values: &[u32]) -> Option<Int> {
         self.evaluations += 1;
         let mut sums = std::mem::take(&mut self.sums);
         sums.clear();
@@ -191,11 +191,6 @@ impl OnlineCostPartitioning {
         let tables: usize = self.tables.iter().map(Vec::len).sum();
         let transitions: usize = self.abstractions.iter().map(Abstraction::size).sum();
         tables * size_of::<u32>() + transitions * size_of::<(u32, u32)>()
-    }
-
-    /// Returns the number of kept cost partitionings.
-    pub fn partitionings(&self) -> usize {
-        self.partitionings
     }
 
     /// Computes the cost partitioning of an order for a state from which no abstraction proves the goal
@@ -349,4 +344,121 @@ fn stolen_costs(
         sum
     };
     abstractions.iter().zip(distances).map(stolen).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rustc_hash::FxHashMap;
+    use task::task::State;
+    use testing::adl::Generator;
+    use testing::missions::Mission;
+    use testing::random::Random;
+    use testing::{depot, fleet, ground_text, successors};
+
+    use super::*;
+    use crate::bounds::Bounds;
+
+    /// Returns the reachable states of a task, each with the minimum cost to a goal state; `None` if the task has more
+    /// than `max_states` reachable states.
+    fn exact_costs(task: &Task, max_states: usize) -> Option<Vec<(State, Option<Int>)>> {
+        let mut index = FxHashMap::from_iter([(task.initial.clone(), 0)]);
+        let mut states = vec![task.initial.clone()];
+        let mut steps: Vec<(usize, usize, Int)> = Vec::new();
+        let mut position = 0;
+        while position < states.len() {
+            for (next, cost) in successors(task, &states[position].clone()) {
+                let target = *index.entry(next.clone()).or_insert(states.len());
+                if target == states.len() {
+                    states.push(next);
+                }
+                steps.push((position, target, cost));
+            }
+            if states.len() > max_states {
+                return None;
+            }
+            position += 1;
+        }
+        let mut costs: Vec<Option<Int>> =
+            states.iter().map(|state| task.is_goal(state).then_some(0)).collect();
+        // Bellman and Ford: repeat until nothing changes.
+        loop {
+            let mut changed = false;
+            for (source, target, cost) in &steps {
+                if let Some(through) = costs[*target].map(|rest| rest + cost)
+                    && costs[*source].is_none_or(|known| through < known)
+                {
+                    costs[*source] = Some(through);
+                    changed = true;
+                }
+            }
+            if !changed {
+                return Some(states.into_iter().zip(costs).collect());
+            }
+        }
+    }
+
+    /// Compares online cost partitioning with the exact cost of every reachable state, several times, so that cost
+    /// partitionings are added in between. Returns the number of kept cost partitionings, and of positive estimates.
+    fn check_online(text: &(String, String)) -> [usize; 2] {
+        let task = ground_text(text.clone());
+        if task.unreachable.is_some() {
+            return [0; 2];
+        }
+        let limits = Limits::none();
+        let context = Context::new(&task, &limits);
+        let bounds = Bounds::new(context).expect("no limit");
+        let Some(exact) = exact_costs(&task, 3_000) else { return [0; 2] };
+        let [mut kept, mut positive] = [0; 2];
+        for max_work in [500, 10_000, 10_000_000] {
+            let Some(mut online) = bounds.online_cost_partitioning(context, max_work).expect("no limit")
+            else {
+                continue;
+            };
+            for _ in 0..3 {
+                for (state, cost) in &exact {
+                    let estimate = online.estimate(&state.values);
+                    let is_admissible =
+                        cost.is_none_or(|cost| estimate.is_some_and(|estimate| estimate <= cost));
+                    assert!(is_admissible, "{estimate:?} of {cost:?} in {state:?}: {text:?}");
+                    positive += usize::from(estimate.is_some_and(|estimate| estimate > 0));
+                }
+            }
+            kept += online.partitionings;
+        }
+        [kept, positive]
+    }
+
+    /// Checks random tasks of four kinds. Returns the sums of the results of [`check_online`] for each kind.
+    fn check_online_all(seeds: std::ops::Range<u64>) -> [[usize; 2]; 4] {
+        let mut sums = [[0; 2]; 4];
+        for seed in seeds {
+            let mut adl = Generator(Random(seed));
+            let mission = Mission::random(seed);
+            let texts = [
+                (adl.domain(), adl.problem()),
+                (mission.domain(), mission.problem()),
+                fleet(seed),
+                depot(seed),
+            ];
+            for (text, sum) in texts.iter().zip(&mut sums) {
+                let [kept, positive] = check_online(text);
+                *sum = [sum[0] + kept, sum[1] + positive];
+            }
+        }
+        sums
+    }
+
+    #[test]
+    fn online_cost_partitionings_are_admissible_in_all_reachable_states() {
+        let sums = check_online_all(0..30);
+        let [_, _, fleets, depots] = sums;
+        let is_reached = fleets[0] > 10 && depots[0] > 10 && sums.iter().all(|[_, positive]| *positive > 10);
+        assert!(is_reached, "kept cost partitionings and positive estimates for each kind of task: {sums:?}");
+    }
+
+    #[test]
+    #[ignore = "takes minutes"]
+    fn many_online_cost_partitionings_are_admissible_in_all_reachable_states() {
+        check_online_all(30..1_000);
+    }
 }
