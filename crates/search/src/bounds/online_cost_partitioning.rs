@@ -50,6 +50,10 @@ pub struct OnlineCostPartitioning {
     /// For each abstraction: for each abstract state, a row of `stride` goal distances. The first is the distance
     /// under the full costs, the others under the shares of cost partitionings.
     tables: Vec<Vec<u32>>,
+    /// Number of rows of all tables.
+    rows: usize,
+    /// Number of abstract states and transitions of all abstractions.
+    transitions: usize,
     stride: usize,
     partitionings: usize,
     /// For each abstraction: whether it detects dead ends, or has a share of a kept cost partitioning. Others are
@@ -128,9 +132,11 @@ impl OnlineCostPartitioning {
         }
         let is_active = alone.iter().map(|row| row.contains(&UNREACHABLE)).collect();
         let stolen = stolen_costs(&abstractions, &alone, &costs, &mut scratch);
-        let visits: usize = abstractions.iter().map(Abstraction::size).sum();
-        let order_work = visits as u64 * 2 * WORK_PER_VISIT;
+        let transitions: usize = abstractions.iter().map(Abstraction::size).sum();
+        let order_work = transitions as u64 * 2 * WORK_PER_VISIT;
         let mut partitioning = Self {
+            rows: abstractions.iter().map(Abstraction::len).sum(),
+            transitions,
             abstractions,
             costs,
             unit,
@@ -188,17 +194,14 @@ impl OnlineCostPartitioning {
 
     /// Returns the memory of the goal distances and abstractions, in bytes.
     pub(crate) fn bytes(&self) -> usize {
-        let tables: usize = self.tables.iter().map(Vec::len).sum();
-        let transitions: usize = self.abstractions.iter().map(Abstraction::size).sum();
-        tables * size_of::<u32>() + transitions * size_of::<(u32, u32)>()
+        self.rows * self.stride * size_of::<u32>() + self.transitions * size_of::<(u32, u32)>()
     }
 
     /// Computes the cost partitioning of an order for a state from which no abstraction proves the goal
     /// unreachable, and keeps it if it raises the estimate. Returns its estimate.
     fn try_order(&mut self, values: &[u32], estimate: u32) -> u32 {
-        let rows: usize = self.abstractions.iter().map(Abstraction::len).sum();
         let is_full = self.partitionings + 1 >= self.stride
-            && rows.saturating_mul(self.stride * 2).saturating_mul(size_of::<u32>())
+            && self.rows.saturating_mul(self.stride * 2).saturating_mul(size_of::<u32>())
                 > self.limits.room() / TABLE_SHARE;
         if self.partitionings >= MAX_PARTITIONINGS || is_full {
             self.next_order = u64::MAX;
