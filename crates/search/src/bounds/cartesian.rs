@@ -48,7 +48,7 @@ pub(super) struct RefinementLimits {
 }
 
 /// Position of the value set of a variable in the words of an abstract state.
-struct Field {
+struct ValueSetField {
     start: usize,
     /// Number of words; 1 if the variable shares its word with other variables.
     words: usize,
@@ -59,7 +59,7 @@ struct Field {
 
 /// A transition to or from another abstract state.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Arc {
+struct Edge {
     state: u32,
     operator: u32,
 }
@@ -85,12 +85,12 @@ struct Refinement<'a> {
     costs: &'a [u32],
     by_effect: &'a [Vec<u32>],
     subtask: &'a Subtask,
-    fields: Vec<Field>,
+    fields: Vec<ValueSetField>,
     width: usize,
     /// Value sets: `width` words for each abstract state.
     sets: Vec<u64>,
-    outgoing: Vec<Vec<Arc>>,
-    incoming: Vec<Vec<Arc>>,
+    outgoing: Vec<Vec<Edge>>,
+    incoming: Vec<Vec<Edge>>,
     transitions: usize,
     tree: Vec<SplitNode>,
     /// For each abstract state: its leaf in the tree.
@@ -187,7 +187,7 @@ impl<'a> Refinement<'a> {
         let goals = (0..states).filter(|state| self.is_goal(*state)).collect();
         let sources = (0..states).zip(&self.outgoing);
         let transitions = sources
-            .flat_map(|(source, arcs)| arcs.iter().map(move |arc| (source, arc.operator, arc.state)))
+            .flat_map(|(source, edges)| edges.iter().map(move |edge| (source, edge.operator, edge.state)))
             .collect();
         Abstraction::new(StateMap::Tree(SplitTree(self.tree)), self.leaves.len(), goals, transitions)
     }
@@ -232,9 +232,9 @@ impl<'a> Refinement<'a> {
 
     /// Returns a cheapest abstract plan as operators with the abstract states they lead to; `None` if there is
     /// none. A\* raises the lower bounds on goal distances that it uses as heuristic.
-    fn abstract_plan(&mut self, pulse: &mut LimitPoll<'_>) -> Result<Option<Vec<Arc>>, Interrupted> {
+    fn abstract_plan(&mut self, pulse: &mut LimitPoll<'_>) -> Result<Option<Vec<Edge>>, Interrupted> {
         let mut costs = vec![UNREACHABLE; self.leaves.len()];
-        let mut parents: Vec<Option<Arc>> = vec![None; self.leaves.len()];
+        let mut parents: Vec<Option<Edge>> = vec![None; self.leaves.len()];
         let mut closed: Vec<u32> = Vec::new();
         let mut open = BinaryHeap::new();
         costs[self.initial as usize] = 0;
@@ -254,26 +254,26 @@ impl<'a> Refinement<'a> {
             }
             closed.push(state);
             self.work += WORK_PER_VISIT * (self.outgoing[state as usize].len() as u64 + 2);
-            for arc in &self.outgoing[state as usize] {
-                let through = cost.saturating_add(self.costs[arc.operator as usize]);
-                if through < costs[arc.state as usize] {
-                    costs[arc.state as usize] = through;
-                    parents[arc.state as usize] = Some(Arc { state, operator: arc.operator });
-                    let total = through.saturating_add(self.to_go[arc.state as usize]);
-                    open.push(Reverse((total, through, arc.state)));
+            for edge in &self.outgoing[state as usize] {
+                let through = cost.saturating_add(self.costs[edge.operator as usize]);
+                if through < costs[edge.state as usize] {
+                    costs[edge.state as usize] = through;
+                    parents[edge.state as usize] = Some(Edge { state, operator: edge.operator });
+                    let total = through.saturating_add(self.to_go[edge.state as usize]);
+                    open.push(Reverse((total, through, edge.state)));
                 }
             }
         }
         Ok(None)
     }
 
-    fn path_to(&self, goal: u32, parents: &[Option<Arc>]) -> Vec<Arc> {
+    fn path_to(&self, goal: u32, parents: &[Option<Edge>]) -> Vec<Edge> {
         let mut path = Vec::new();
         let mut state = goal;
         while state != self.initial
             && let Some(parent) = parents[state as usize]
         {
-            path.push(Arc { state, operator: parent.operator });
+            path.push(Edge { state, operator: parent.operator });
             state = parent.state;
         }
         path.reverse();
@@ -282,12 +282,12 @@ impl<'a> Refinement<'a> {
 
     /// Returns the split for the first flaw of an abstract plan, or `None` if the plan has no flaw, or no split
     /// avoids it.
-    fn flaw(&mut self, plan: &[Arc]) -> Option<Flaw> {
+    fn flaw(&mut self, plan: &[Edge]) -> Option<Flaw> {
         let task = self.task;
         let mut values = task.initial.values[..task.basic].to_vec();
         let mut state = self.initial;
-        for arc in plan {
-            let operator = &task.operators[arc.operator as usize];
+        for edge in plan {
+            let operator = &task.operators[edge.operator as usize];
             self.work += WORK_PER_VISIT / 4 * values.len() as u64;
             let violated = self.violated(&operator.condition.facts, &values, state);
             if !violated.is_empty() {
@@ -297,15 +297,15 @@ impl<'a> Refinement<'a> {
             let mut candidates = Vec::new();
             let mut has_deviation = false;
             for (variable, value) in next.iter().enumerate() {
-                if !self.contains(arc.state, variable, *value) {
+                if !self.contains(edge.state, variable, *value) {
                     has_deviation = true;
-                    self.explain_deviation(operator, [state, arc.state], variable, &values, &mut candidates);
+                    self.explain_deviation(operator, [state, edge.state], variable, &values, &mut candidates);
                 }
             }
             if has_deviation {
                 return self.most_refined(candidates);
             }
-            (values, state) = (next, arc.state);
+            (values, state) = (next, edge.state);
         }
         self.most_refined(self.violated(&self.subtask.goals, &values, state))
     }
@@ -470,16 +470,16 @@ impl<'a> Refinement<'a> {
         self.transitions -= incoming.len() + outgoing.len();
         self.work += WORK_PER_VISIT
             * (2 * (incoming.len() + outgoing.len()) + 2 * self.by_effect[variable].len()) as u64;
-        remove_arcs(&mut self.outgoing, &incoming, state);
-        remove_arcs(&mut self.incoming, &outgoing, state);
-        for Arc { state: source, operator } in incoming {
+        remove_edges(&mut self.outgoing, &incoming, state);
+        remove_edges(&mut self.incoming, &outgoing, state);
+        for Edge { state: source, operator } in incoming {
             for part in [state, new] {
                 if self.may_lead(&task.operators[operator as usize], [source, part], variable) {
                     self.connect(source, operator, part);
                 }
             }
         }
-        for Arc { state: target, operator: index } in outgoing {
+        for Edge { state: target, operator: index } in outgoing {
             let operator = &task.operators[index as usize];
             let required = value_of(&operator.condition.facts, variable);
             for part in [state, new] {
@@ -503,23 +503,23 @@ impl<'a> Refinement<'a> {
     }
 
     fn connect(&mut self, source: u32, operator: u32, target: u32) {
-        self.outgoing[source as usize].push(Arc { state: target, operator });
-        self.incoming[target as usize].push(Arc { state: source, operator });
+        self.outgoing[source as usize].push(Edge { state: target, operator });
+        self.incoming[target as usize].push(Edge { state: source, operator });
         self.transitions += 1;
     }
 }
 
-/// Removes the transitions to or from `state` from the lists of the states at the other ends of `arcs`.
-fn remove_arcs(lists: &mut [Vec<Arc>], arcs: &[Arc], state: u32) {
-    let mut others: Vec<u32> = arcs.iter().map(|arc| arc.state).collect();
+/// Removes the transitions to or from `state` from the lists of the states at the other ends of `edges`.
+fn remove_edges(lists: &mut [Vec<Edge>], edges: &[Edge], state: u32) {
+    let mut others: Vec<u32> = edges.iter().map(|edge| edge.state).collect();
     others.sort_unstable();
     others.dedup();
     for other in others {
-        lists[other as usize].retain(|arc| arc.state != state);
+        lists[other as usize].retain(|edge| edge.state != state);
     }
 }
 
-impl Field {
+impl ValueSetField {
     /// Returns the word within an abstract state and the bit of a value.
     #[expect(clippy::arithmetic_side_effects, reason = "bits of a word, and words in memory")]
     fn bit(&self, value: u32) -> (usize, u64) {
@@ -531,7 +531,7 @@ impl Field {
 /// Assigns value sets of basic variables to words. A set of at most 64 values does not cross the end of a word.
 /// Returns the number of words, too.
 #[expect(clippy::arithmetic_side_effects, reason = "bits of a word, and words in memory")]
-fn fields(task: &Task) -> (Vec<Field>, usize) {
+fn fields(task: &Task) -> (Vec<ValueSetField>, usize) {
     let mut fields = Vec::with_capacity(task.basic);
     // The last word, and the number of its used bits.
     let (mut words, mut used) = (0, 64);
@@ -539,7 +539,7 @@ fn fields(task: &Task) -> (Vec<Field>, usize) {
         let size = dense(task.variables[variable.index()].values.len());
         if size > 64 {
             let count = size.div_ceil(64) as usize;
-            fields.push(Field { start: words, words: count, shift: 0, mask: u64::MAX, size });
+            fields.push(ValueSetField { start: words, words: count, shift: 0, mask: u64::MAX, size });
             (words, used) = (words + count, 64);
             continue;
         }
@@ -547,7 +547,7 @@ fn fields(task: &Task) -> (Vec<Field>, usize) {
             (words, used) = (words + 1, 0);
         }
         let mask = (u64::MAX >> (64 - size)) << used;
-        fields.push(Field { start: words - 1, words: 1, shift: used, mask, size });
+        fields.push(ValueSetField { start: words - 1, words: 1, shift: used, mask, size });
         used += size;
     }
     (fields, words)
