@@ -5,7 +5,7 @@ use rules::{Atom, Term};
 
 use super::context::{Conjunction, Context, Equality, INTERNAL, Variables, cross, identity};
 use super::range;
-use crate::owl::{Axiom, Bound, ClassExpression, DataRange, ObjectPropertyExpression};
+use crate::owl::{Axiom, Bound, ClassExpression, DataRange, Iri, ObjectPropertyExpression};
 use crate::vocab::owl;
 
 /// Consequences of membership in a class: pairs of additional conditions and head atoms. An empty head
@@ -178,7 +178,13 @@ pub(crate) fn conclusions(
             consequences
         }
         // As for functional properties, different names are not concluded to be equal.
-        C::OneOf(individuals) if individuals.len() == 1 && context.equality == Equality::UniqueNames => {
+        C::OneOf(individuals) if context.equality == Equality::UniqueNames => {
+            let differs = |individual: &Iri| Atom::Different(x, context.constant(individual));
+            vec![(individuals.iter().map(differs).collect(), Vec::new())]
+        }
+        C::OneOf(individuals)
+            if individuals.len() == 1 && context.equality == Equality::UncheckedUniqueNames =>
+        {
             Vec::new()
         }
         C::OneOf(individuals) if individuals.len() == 1 => {
@@ -266,15 +272,23 @@ fn at_most_one(
     x: Term,
     variables: &mut Variables,
 ) -> Conclusions {
-    // As for functional properties, different names are not concluded to be equal.
-    if context.equality == Equality::UniqueNames {
+    if context.equality == Equality::UncheckedUniqueNames {
         return Vec::new();
     }
     let (y, z) = (variables.fresh("y"), variables.fresh("z"));
     let edges = vec![vec![context.property(property, x, y), context.property(property, x, z)]];
     let bodies = cross(&edges, &brief_condition(context, filler, y, variables));
     let bodies = cross(&bodies, &brief_condition(context, filler, z, variables));
-    bodies.into_iter().map(|body| (body, vec![Atom::Same(y, z)])).collect()
+    let equality = context.equality;
+    let conclusion = |mut body: Conjunction| match equality {
+        // As for functional properties, different names are not concluded to be equal.
+        Equality::UniqueNames => {
+            body.push(Atom::Different(y, z));
+            (body, Vec::new())
+        }
+        _ => (body, vec![Atom::Same(y, z)]),
+    };
+    bodies.into_iter().map(conclusion).collect()
 }
 
 fn all_values(
