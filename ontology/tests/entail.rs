@@ -140,7 +140,11 @@ fn conclusions_about_some_individuals_are_not_proved_of_all() {
         (":A(?x) ^ 0 = count { :p(?x, ?y) } -> :C(?x) .", ":i a :A ; :p :i .", below),
         (":d(?x, ?v) ^ not swrlb:equal(?v, 5) -> :C(?x) .", ":i :d 5 .", ":d rdfs:domain :C ."),
         (":A(?x) ^ :B(?y) ^ not sameAs(?x, ?y) -> :C(?x) .", ":i a :A , :B .", below),
-        (":A(?x) ^ :B(?y) ^ not differentFrom(?x, ?y) -> :C(?x) .", ":i a :A . :j a :B . :i owl:differentFrom :j .", below),
+        (
+            ":A(?x) ^ :B(?y) ^ not differentFrom(?x, ?y) -> :C(?x) .",
+            ":i a :A . :j a :B . :i owl:differentFrom :j .",
+            below,
+        ),
         (":d(?x, ?v) ^ swrlb:notEqual(?v, 5) -> :C(?x) .", ":i :d 5 .", ":d rdfs:domain :C ."),
         (
             ":d(?x, ?v) ^ swrlb:stringConcat(?s, ?v, \"\") ^ swrlb:stringLength(?l, ?s) ^ swrlb:lessThan(?l, 3) -> :C(?x) .",

@@ -57,7 +57,8 @@ impl<'a> Lowering<'a> {
             [Atom::Same(left, right)] => Some(Atom::Different(left, right)),
             _ => None,
         };
-        let mut body: Vec<Option<Condition>> = rule.body.iter().map(|atom| self.condition(atom, guard.as_ref())).collect();
+        let mut body: Vec<Option<Condition>> =
+            rule.body.iter().map(|atom| self.condition(atom, guard.as_ref())).collect();
         for scope in binding(rule).scopes {
             body[scope.position] = self.aggregate(position, rule, &scope, &body);
         }
@@ -132,7 +133,8 @@ impl<'a> Lowering<'a> {
         let Atom::Aggregate { aggregate, result, body } = &rule.body[scope.position] else { return None };
         let variables = [scope.group.as_slice(), &scope.locals].concat();
         let matches = self.anonymous(variables.len());
-        let mut conditions: Vec<Condition> = body.iter().filter_map(|atom| self.condition(atom, None)).collect();
+        let mut conditions: Vec<Condition> =
+            body.iter().filter_map(|atom| self.condition(atom, None)).collect();
         // Outer conditions bind the variables that the aggregate's own atoms leave open.
         conditions.extend(scope.context.iter().filter_map(|&at| outer_conditions[at].clone()));
         let heads = vec![Template { relation: matches, arguments: columns(&variables) }];

@@ -242,12 +242,17 @@ fn stratify(
         strata = components(&successors);
     }
     let name = |relation: RelationId| {
-        store.get(relation).predicate.map(|predicate| symbols.value(predicate).to_string()).unwrap_or_default()
+        store
+            .get(relation)
+            .predicate
+            .map(|predicate| symbols.value(predicate).to_string())
+            .unwrap_or_default()
     };
     let mut errors = Vec::new();
     for rule in rules {
-        let is_recursive =
-            |relation: RelationId| rule.heads.iter().any(|head| strata[head.relation.0 as usize] == strata[relation.0 as usize]);
+        let is_recursive = |relation: RelationId| {
+            rule.heads.iter().any(|head| strata[head.relation.0 as usize] == strata[relation.0 as usize])
+        };
         if let Some(same_as) = same_as.filter(|same_as| rule.compares_names() && is_recursive(*same_as)) {
             let (rule, predicate) = (program.rules[rule.rule].identity.clone(), name(same_as));
             errors.push(Error::Unstratified { rule, predicate });

@@ -172,7 +172,8 @@ fn arity(rule: &Rule, atom: &Atom) -> Option<Error> {
     let identity = || rule.identity.clone();
     match atom {
         Atom::BuiltIn { built_in, arguments } | Atom::NotBuiltIn { built_in, arguments }
-            if !built_in.accepts(arguments.len()) => {
+            if !built_in.accepts(arguments.len()) =>
+        {
             let (built_in, count) = (built_in.name(), arguments.len());
             Some(Error::BuiltInArity { rule: identity(), built_in, count })
         }

@@ -368,7 +368,8 @@ fn negated_comparisons_follow_changes_of_equality() {
         "p(a)",
         &["= p(a) ^ q(a, a)", "+r(c)", "= p(a) ^ p(b) ^ r(c)", "-r(c)", "= p(a) ^ q(a, a)"],
     );
-    let one = |number: u8| format!("= p(a) ^ p(b) ^ n(\"{number}\"^^http://www.w3.org/2001/XMLSchema#integer)");
+    let one =
+        |number: u8| format!("= p(a) ^ p(b) ^ n(\"{number}\"^^http://www.w3.org/2001/XMLSchema#integer)");
     check(
         "?n = count { p(?x) ^ not sameAs(?x, b) } -> n(?n)",
         "p(a), p(b)",

@@ -147,10 +147,7 @@ fn unsafe_rules_are_refused_all_at_once() {
             "R203 rule test#1: variable ?z is only tested, never bound",
         ],
     );
-    check(
-        "p(?x) -> not swrlb:lessThan(?x, 3)",
-        &["R205 rule test#0: a head may not contain a negated atom"],
-    );
+    check("p(?x) -> not swrlb:lessThan(?x, 3)", &["R205 rule test#0: a head may not contain a negated atom"]);
     check("p(?x) -> swrlb:lessThan(?x, 3)", &["R205 rule test#0: a head may not contain a built-in"]);
     check(
         "p(?x) ^ not q(?x) -> r(?x) . r(?x) -> q(?x)",

@@ -180,9 +180,8 @@ impl Prover {
             with_facts(&copy, facts)
         };
         // One value of all properties.
-        let assumed = |properties: &[&Iri]| {
-            assumed_values(properties, &vec![Literal::fresh(1); properties.len()])
-        };
+        let assumed =
+            |properties: &[&Iri]| assumed_values(properties, &vec![Literal::fresh(1); properties.len()]);
         let implies = |(sub, sup): (&Iri, &Iri)| -> ProofResult {
             let mut copy = assumed(&[sub])?;
             let goal = value(&mut copy, sup, &Self::fresh(0), Literal::fresh(1));

@@ -108,7 +108,9 @@ pub(super) fn monotone(engine: &Engine) -> Result<Engine, Error> {
     let (mut copy, program) = (engine.clone(), engine.program());
     let predicate = copy.symbols_mut().name(NAMED);
     let is_restricted = |rule: &Rule| {
-        rule.body.iter().any(|atom| matches!(atom, Atom::Relation { predicate: other, .. } if *other == predicate))
+        rule.body
+            .iter()
+            .any(|atom| matches!(atom, Atom::Relation { predicate: other, .. } if *other == predicate))
     };
     let is_open_key = |rule: &Rule| is_key(rule) && !is_restricted(rule);
     if program.rules.iter().all(|rule| is_monotone(rule) && !is_open_key(rule)) {
@@ -118,7 +120,8 @@ pub(super) fn monotone(engine: &Engine) -> Result<Engine, Error> {
         let mut rule = rule.clone();
         if is_open_key(&rule) {
             let atoms = rule.body.iter().filter(|atom| matches!(atom, Atom::Relation { .. }));
-            let variables: BTreeSet<_> = atoms.flat_map(Atom::terms).filter(|term| term.as_variable().is_some()).collect();
+            let variables: BTreeSet<_> =
+                atoms.flat_map(Atom::terms).filter(|term| term.as_variable().is_some()).collect();
             rule.body.extend(variables.into_iter().map(|variable| Atom::relation(predicate, [variable])));
         }
         rule

@@ -177,19 +177,7 @@ pub(crate) fn conclusions(
             }
             consequences
         }
-        // As for functional properties, different names are not concluded to be equal.
-        C::OneOf(individuals) if context.equality == Equality::UniqueNames => {
-            let differs = |individual: &Iri| Atom::Different(x, context.constant(individual));
-            vec![(individuals.iter().map(differs).collect(), Vec::new())]
-        }
-        C::OneOf(individuals)
-            if individuals.len() == 1 && context.equality == Equality::UncheckedUniqueNames =>
-        {
-            Vec::new()
-        }
-        C::OneOf(individuals) if individuals.len() == 1 => {
-            heads(Atom::Same(x, context.constant(&individuals[0])))
-        }
+        C::OneOf(individuals) => one_of(context, individuals, x),
         C::HasValue(property, individual) => {
             let value = context.constant(individual);
             heads(context.property(property, x, value))
@@ -258,10 +246,25 @@ pub(crate) fn conclusions(
             heads(context.relation(property, [x, value]))
         }
         C::DataSomeValuesFrom(..) | C::DataCardinality(Bound::Min, 1, ..) => context.gap(EXISTS),
-        C::UnionOf(_) | C::OneOf(_) => context.gap("a union as a conclusion"),
+        C::UnionOf(_) => context.gap("a union as a conclusion"),
         C::Cardinality(..) | C::DataCardinality(..) => {
             only_included(context, class, x, "a cardinality as a conclusion")
         }
+    }
+}
+
+fn one_of(context: &mut Context, individuals: &[Iri], x: Term) -> Conclusions {
+    match (context.equality, individuals) {
+        // As for functional properties, different names are not concluded to be equal.
+        (Equality::UniqueNames, _) => {
+            let differs = |individual: &Iri| Atom::Different(x, context.constant(individual));
+            vec![(individuals.iter().map(differs).collect(), Vec::new())]
+        }
+        (Equality::UncheckedUniqueNames, [_]) => Vec::new(),
+        (Equality::Owl, [individual]) => {
+            vec![(Vec::new(), vec![Atom::Same(x, context.constant(individual))])]
+        }
+        _ => context.gap("a union as a conclusion"),
     }
 }
 

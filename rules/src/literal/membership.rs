@@ -44,9 +44,10 @@ impl Literal {
             return false;
         }
         match (self.kind(), other.kind()) {
-            (Kind::Unknown, _) | (_, Kind::Unknown) | (Kind::Xml, Kind::Xml) => false,
             (Kind::Distinct, Kind::Distinct) => true,
-            (Kind::Fresh | Kind::Distinct, _) | (_, Kind::Fresh | Kind::Distinct) => false,
+            (Kind::Unknown | Kind::Fresh | Kind::Distinct, _)
+            | (_, Kind::Unknown | Kind::Fresh | Kind::Distinct)
+            | (Kind::Xml, Kind::Xml) => false,
             _ => true,
         }
     }

@@ -283,7 +283,8 @@ fn filter(
         }
         Atom::NotSame(left, right) => {
             let names = representatives(symbols, facts);
-            let find = |term| value(term, &binding).map(|symbol| names.get(&symbol).copied().unwrap_or(symbol));
+            let find =
+                |term| value(term, &binding).map(|symbol| names.get(&symbol).copied().unwrap_or(symbol));
             (find(*left) != find(*right)).then_some(binding)
         }
         Atom::NotDifferent(left, right) => {
