@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use rules::{Atom, Delta, Engine, Error, Fact, Literal, Program, Rule, Symbol, Symbols};
+use rules::{Atom, Delta, Engine, Error, Fact, Literal, Program, Rule, Symbol, Symbols, Term};
 
 use crate::lower::AXIOM_SOURCE;
 use crate::owl::{Iri, ObjectPropertyExpression};
@@ -106,35 +106,29 @@ pub(super) fn monotone(engine: &Engine) -> Result<Engine, Error> {
     let is_closed_world = |atom: &Atom| atom.is_negated() || matches!(atom, Atom::Aggregate { .. });
     let is_monotone = |rule: &Rule| !rule.body.iter().any(is_closed_world);
     let (mut copy, program) = (engine.clone(), engine.program());
-    let predicate = copy.symbols_mut().name(NAMED);
-    let is_restricted = |rule: &Rule| {
-        rule.body
-            .iter()
-            .any(|atom| matches!(atom, Atom::Relation { predicate: other, .. } if *other == predicate))
-    };
-    let is_open_key = |rule: &Rule| is_key(rule) && !is_restricted(rule);
-    if program.rules.iter().all(|rule| is_monotone(rule) && !is_open_key(rule)) {
+    let predicate = engine.symbols().find_name(NAMED);
+    let is_restriction =
+        |atom: &Atom| matches!(atom, Atom::Relation { predicate: other, .. } if Some(*other) == predicate);
+    let is_open_key = |rule: &Rule| is_key(rule) && !rule.body.iter().any(is_restriction);
+    let has_open_keys = program.rules.iter().any(is_open_key);
+    if program.rules.iter().all(is_monotone) && !has_open_keys {
         return Ok(copy);
     }
-    let restricted = |rule: &Rule| {
-        let mut rule = rule.clone();
-        if is_open_key(&rule) {
+    let mut rules: Vec<Rule> = program.rules.iter().filter(|rule| is_monotone(rule)).cloned().collect();
+    if has_open_keys {
+        let predicate = copy.symbols_mut().name(NAMED);
+        for rule in rules.iter_mut().filter(|rule| is_open_key(rule)) {
             let atoms = rule.body.iter().filter(|atom| matches!(atom, Atom::Relation { .. }));
-            let variables: BTreeSet<_> =
-                atoms.flat_map(Atom::terms).filter(|term| term.as_variable().is_some()).collect();
+            let terms = atoms.flat_map(Atom::terms).filter(|term| term.as_variable().is_some());
+            let variables: BTreeSet<Term> = terms.collect();
             rule.body.extend(variables.into_iter().map(|variable| Atom::relation(predicate, [variable])));
         }
-        rule
-    };
-    let has_open_keys = program.rules.iter().any(is_open_key);
-    let rules = program.rules.iter().filter(|rule| is_monotone(rule)).map(restricted).collect();
-    let program = Program { rules, equality: program.equality };
-    if has_open_keys {
         let symbols: BTreeSet<Symbol> = engine.facts().flat_map(|fact| fact.arguments).collect();
         let insert = symbols.into_iter().map(|symbol| Fact::new(predicate, [symbol])).collect();
         copy.apply(Delta { insert, delete: Vec::new() })?;
     }
-    copy.set_program(program).map_err(|errors| errors.into_vec().remove(0))?;
+    copy.set_program(Program { rules, equality: program.equality })
+        .map_err(|errors| errors.into_vec().remove(0))?;
     Ok(copy)
 }
 
