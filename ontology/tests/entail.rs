@@ -115,10 +115,14 @@ fn entailed_statements_are_proved_and_others_are_not() {
 }
 
 fn follows_by(rule: &str, facts: &str, conclusion: &str) -> bool {
+    follows_under(Equality::Owl, rule, facts, conclusion)
+}
+
+fn follows_under(equality: Equality, rule: &str, facts: &str, conclusion: &str) -> bool {
     let mut symbols = Symbols::new();
     let prefixes = Prefixes::new().with("", "http://e/#");
     let rules = parse_rules(rule, "rules", &mut symbols, &prefixes).expect(rule).rules;
-    let lowered = lower_together(&read(facts), rules, Equality::Owl, &mut symbols);
+    let lowered = lower_together(&read(facts), rules, equality, &mut symbols);
     let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
     let results = entailments(&engine, &read(conclusion)).expect("it ends");
     assert!(!results.is_empty(), "{conclusion}");
@@ -134,6 +138,13 @@ fn conclusions_about_some_individuals_are_not_proved_of_all() {
     for (rule, counterexample, conclusion) in [
         (negation, ":i a :A , :B .", below),
         (":A(?x) ^ 0 = count { :p(?x, ?y) } -> :C(?x) .", ":i a :A ; :p :i .", below),
+        (":d(?x, ?v) ^ not swrlb:equal(?v, 5) -> :C(?x) .", ":i :d 5 .", ":d rdfs:domain :C ."),
+        (":A(?x) ^ :B(?y) ^ not sameAs(?x, ?y) -> :C(?x) .", ":i a :A , :B .", below),
+        (
+            ":A(?x) ^ :B(?y) ^ not differentFrom(?x, ?y) -> :C(?x) .",
+            ":i a :A . :j a :B . :i owl:differentFrom :j .",
+            below,
+        ),
         (":d(?x, ?v) ^ swrlb:notEqual(?v, 5) -> :C(?x) .", ":i :d 5 .", ":d rdfs:domain :C ."),
         (
             ":d(?x, ?v) ^ swrlb:stringConcat(?s, ?v, \"\") ^ swrlb:stringLength(?l, ?s) ^ swrlb:lessThan(?l, 3) -> :C(?x) .",
@@ -146,6 +157,79 @@ fn conclusions_about_some_individuals_are_not_proved_of_all() {
     }
     assert!(follows_by(negation, ":i a :A .", ":i a :C ."), "it is looked up");
     assert!(follows_by(":A(?x) -> :C(?x) .", ":i a :A .", below));
+}
+
+/// Two values of a functional property that are only restricted to datatypes can be one value.
+#[test]
+fn values_of_restrictions_may_be_equal() {
+    let functional = ":d a owl:FunctionalProperty . :e rdfs:subPropertyOf :d .";
+    let some = |property: &str, datatype: &str| {
+        format!("[ a owl:Restriction ; owl:onProperty {property} ; owl:someValuesFrom {datatype} ]")
+    };
+    let (integer, decimal) = (some(":d", "xsd:integer"), some(":d", "xsd:decimal"));
+    let below = some(":e", "xsd:integer");
+    let not = |class: &str| format!("[ a owl:Class ; owl:complementOf {class} ]");
+    let both = format!("[ a owl:Class ; owl:intersectionOf ( {integer} {decimal} ) ]");
+    for conclusion in [
+        format!("{integer} owl:disjointWith {decimal} ."),
+        format!("{both} rdfs:subClassOf owl:Nothing ."),
+        format!("{both} rdfs:subClassOf :C ."),
+        format!(":d rdfs:domain {} .", not(&integer)),
+        format!("{below} rdfs:subClassOf {} .", not(&integer)),
+        format!(
+            "{integer} rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :e ; owl:onDataRange xsd:integer ;
+             owl:maxQualifiedCardinality 0 ] ."
+        ),
+        ":A owl:hasKey ( :d :e ) .".to_owned(),
+    ] {
+        assert!(!follows(functional, &conclusion), "{conclusion}");
+    }
+    // Proofs that assume two different values remain.
+    let most = "[ a owl:Restriction ; owl:onProperty :e ; owl:maxCardinality 1 ]";
+    for conclusion in [format!(":A rdfs:subClassOf {most} ."), ":e a owl:FunctionalProperty .".to_owned()] {
+        assert!(follows(functional, &conclusion), "{conclusion}");
+    }
+}
+
+/// A key identifies only individuals with a name, and a member of a class can have none.
+#[test]
+fn keys_do_not_identify_arbitrary_individuals() {
+    let keyed = ":A owl:hasKey ( :d ) . :i a :A ; :d 1 .";
+    let restricted = "[ a owl:Restriction ; owl:onProperty :d ; owl:hasValue 1 ]";
+    let one = "[ a owl:Class ; owl:oneOf ( :i ) ]";
+    let both = format!("[ a owl:Class ; owl:intersectionOf ( :A {restricted} ) ]");
+    assert!(!follows(keyed, &format!("{both} rdfs:subClassOf {one} .")));
+    assert!(follows(&format!("{keyed} :j a :A ; :d 1 ."), ":i owl:sameAs :j ."));
+    let other = ":j a :A ; owl:differentFrom :i .";
+    let absent = "[] a owl:NegativePropertyAssertion ; owl:sourceIndividual :j ; owl:assertionProperty :d ;
+        owl:targetValue 1 .";
+    assert!(follows(&format!("{keyed} {other}"), absent));
+    assert!(!follows(&format!("{keyed} :j a :A ."), absent));
+    assert!(follows(keyed, ":A owl:hasKey ( :d :p ) ."));
+}
+
+#[test]
+fn arbitrary_individuals_may_be_named_under_unique_names() {
+    let follows = |rule: &str, facts: &str, conclusion: &str| {
+        follows_under(Equality::UniqueNames, rule, facts, conclusion)
+    };
+    let rule = ":A(?x) ^ differentFrom(?x, :i) -> :B(?x) .";
+    // The only member of `A` can be `i`.
+    assert!(!follows(rule, ":i a :A .", ":A rdfs:subClassOf :B ."));
+    assert!(follows(rule, ":i a :C . :j a :A .", ":j a :B ."));
+    let different = ":A(?x) ^ :A(?y) ^ differentFrom(?x, ?y) -> .";
+    assert!(!follows(different, "", ":A owl:disjointWith :A ."));
+    let least = |n: u8| format!("[ a owl:Restriction ; owl:onProperty :p ; owl:minCardinality {n} ]");
+    let pairs = ":p(?x, ?y) ^ :p(?x, ?z) ^ differentFrom(?y, ?z) -> :C(?x) .";
+    assert!(follows(pairs, "", &format!("{} rdfs:subClassOf :C .", least(2))));
+    assert!(!follows(pairs, "", &format!("{} rdfs:subClassOf :C .", least(1))));
+    let twice = format!("[ a owl:Class ; owl:intersectionOf ( {} {} ) ]", least(1), least(1));
+    assert!(!follows(pairs, "", &format!("{twice} rdfs:subClassOf :C .")));
+    let functional = ":p a owl:FunctionalProperty . :i :p :j .";
+    let other = "[] a owl:NegativePropertyAssertion ; owl:sourceIndividual :i ; owl:assertionProperty :p ;
+        owl:targetIndividual :k .";
+    assert!(follows("", functional, other));
+    assert!(follows("", ":i owl:sameAs :j .", ":i a :C ."), "everything follows");
 }
 
 #[test]

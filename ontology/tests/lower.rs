@@ -3,8 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use ontology::{AXIOM_SOURCE, Equality, ReadOptions, lower, lower_with, ntriples, read_text};
-use rules::{Engine, Fact, Symbols};
+use ontology::{AXIOM_SOURCE, Equality, ReadOptions, lower, lower_together, lower_with, ntriples, read_text};
+use rules::{Engine, Fact, Literal, Prefixes, Symbols, parse_rules};
 
 const PREFIXES: &str = "@prefix : <http://e/#> .
 @prefix owl: <http://www.w3.org/2002/07/owl#> .
@@ -451,9 +451,98 @@ fn unique_names_do_not_merge() {
     ] {
         let text = format!("{PREFIXES}{axiom} :i :p :j , :k . :j a :A .");
         let ontology = read_text(&text, "t", &ReadOptions::default()).expect("well-formed");
+        let violated = |equality: Equality| {
+            let mut symbols = Symbols::new();
+            let lowered = lower_with(&ontology, equality, &mut symbols);
+            assert!(lowered.warnings.is_empty(), "{axiom}: {:?}", lowered.warnings);
+            let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
+            assert_eq!(derived(&engine), BTreeSet::new(), "{axiom}");
+            !engine.violations().is_empty()
+        };
+        assert!(violated(Equality::UniqueNames), "{axiom}");
+        assert!(!violated(Equality::UncheckedUniqueNames), "{axiom}");
+    }
+}
+
+/// Under the unique name assumption, knowledge is inconsistent if it states or implies that two names are equal.
+#[test]
+fn unique_names_are_not_equal() {
+    for (text, is_violated) in [
+        (":i owl:sameAs :j .", true),
+        (":i owl:sameAs :i .", false),
+        (":A owl:hasKey ( :d ) . :i a :A ; :d 1 . :j a :A ; :d 1.0 .", true),
+        (":A owl:hasKey ( :d ) . :i a :A ; :d 1 . :j a :A ; :d 2 .", false),
+        (":p a owl:InverseFunctionalProperty . :i :p :k . :j :p :k .", true),
+        (":p a owl:FunctionalProperty . :i :p :j .", false),
+        (":B rdfs:subClassOf [ a owl:Class ; owl:oneOf ( :y :z ) ] . :i a :B .", true),
+        (":B rdfs:subClassOf [ a owl:Class ; owl:oneOf ( :y :z ) ] . :z a :B .", false),
+        ("owl:Thing rdfs:subClassOf [ a owl:Class ; owl:oneOf ( :y :z ) ] . :i a :A .", true),
+        ("owl:Thing rdfs:subClassOf [ a owl:Class ; owl:oneOf ( :y :z ) ] . :y a :A .", false),
+    ] {
+        let text = format!("{PREFIXES}{text}");
+        let ontology = read_text(&text, "t", &ReadOptions::default()).expect("well-formed");
         let mut symbols = Symbols::new();
         let lowered = lower_with(&ontology, Equality::UniqueNames, &mut symbols);
         let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
-        assert_eq!(derived(&engine), BTreeSet::new(), "{axiom}");
+        assert_eq!(!engine.violations().is_empty(), is_violated, "{text}");
+    }
+}
+
+/// Derived differences count for negated comparisons and in aggregates, too.
+#[test]
+fn differences_are_derived_for_rule_files() {
+    let text = ":A owl:disjointWith :B . :i a :A . :j a :B .";
+    assert_eq!(values_by(text, ":A(?x) ^ :B(?y) ^ not differentFrom(?x, ?y) -> :e(?x, 1) .").0, [""; 0]);
+    let count = ":A(?x) ^ ?n = count { :B(?y) ^ differentFrom(?x, ?y) } -> :e(?x, ?n) .";
+    assert_eq!(values_by(text, count).0, ["1"]);
+}
+
+/// Returns the values of `:e` by a rule of a rule file, and the warnings.
+fn values_by(text: &str, rule: &str) -> (Vec<String>, Vec<String>) {
+    let text = format!("{PREFIXES}{text}");
+    let ontology = read_text(&text, "t", &ReadOptions::default()).expect("well-formed");
+    let mut symbols = Symbols::new();
+    let prefixes = Prefixes::new().with("", "http://e/#");
+    let rules = parse_rules(rule, "rules", &mut symbols, &prefixes).expect(rule).rules;
+    let lowered = lower_together(&ontology, rules, Equality::Owl, &mut symbols);
+    let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
+    let e = engine.symbols().find_name("http://e/#e");
+    let facts = engine.facts().filter(|fact| Some(fact.predicate) == e);
+    let value = |fact: Fact| engine.symbols().value(fact.arguments[1]).as_literal().map(Literal::lexical);
+    (facts.filter_map(value).collect(), lowered.warnings.iter().map(ToString::to_string).collect())
+}
+
+/// A datatype that the ontology defines is a test in rule files, too.
+#[test]
+fn datatypes_of_the_ontology_are_tests_in_rule_files() {
+    let small = ":T a rdfs:Datatype ; owl:equivalentClass [ a rdfs:Datatype ; owl:onDatatype xsd:integer ;
+        owl:withRestrictions ( [ xsd:maxInclusive 5 ] ) ] . :i :d 3 , 9 , \"x\" .";
+    let listed =
+        ":T a rdfs:Datatype ; owl:equivalentClass [ a rdfs:Datatype ; owl:oneOf ( 3 4 ) ] . :i :d 3 , 9 .";
+    let opaque = ":T a rdfs:Datatype . :i :d 3 .";
+    for (text, rule, expected, warning) in [
+        (small, ":d(?x, ?n) ^ :T(?n) -> :e(?x, ?n) .", &["3"][..], None),
+        (small, ":d(?x, ?n) ^ not :T(?n) -> :e(?x, ?n) .", &["9", "x"], None),
+        (small, ":d(?x, ?n) ^ ?k = count { :d(?x, ?m) ^ :T(?m) } -> :e(?x, ?k) .", &["1"], None),
+        (listed, ":d(?x, ?n) ^ :T(?n) -> :e(?x, ?n) .", &["3"], None),
+        (listed, ":d(?x, ?n) ^ not :T(?n) -> :e(?x, ?n) .", &["9"], None),
+        (
+            small,
+            ":d(?x, ?n) ^ ?k = count { :d(?x, ?m) ^ not :T(?m) } -> :e(?x, ?k) .",
+            &[],
+            Some("a data range of several alternatives in an aggregate"),
+        ),
+        (small, ":d(?x, ?n) -> :T(?n) .", &[], Some("a data range as a conclusion")),
+        (
+            opaque,
+            ":d(?x, ?n) ^ not :T(?n) -> :e(?x, ?n) .",
+            &[],
+            Some("a datatype whose values are not known"),
+        ),
+    ] {
+        let (values, warnings) = values_by(text, rule);
+        assert_eq!(warnings.len(), usize::from(warning.is_some()), "{rule}: {warnings:?}");
+        assert!(warnings.iter().zip(warning).all(|(shown, reason)| shown.contains(reason)), "{warnings:?}");
+        assert_eq!(values, expected, "{rule}");
     }
 }

@@ -1,6 +1,6 @@
 //! Lints for models: reported mistakes, and models without mistakes.
 
-use ontology::{Ontology, ReadOptions, kb, lower, read_files, read_text, tomasys};
+use ontology::{Equality, Ontology, ReadOptions, kb, lower, read_files, read_text, tomasys};
 use rules::{Engine, Symbols};
 use test_resources::data;
 
@@ -16,7 +16,7 @@ fn warnings(ontology: &Ontology) -> Vec<String> {
     let mut symbols = Symbols::new();
     let lowered = lower(ontology, &mut symbols);
     let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe rules");
-    tomasys::check(ontology, &engine).iter().map(ToString::to_string).collect()
+    tomasys::check(ontology, &engine, Equality::Owl).iter().map(ToString::to_string).collect()
 }
 
 fn check(model: &str, expected: &[&str]) {

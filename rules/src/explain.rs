@@ -107,7 +107,7 @@ impl Engine {
             Atom::Relation { predicate, .. } => *predicate,
             Atom::Same(..) => self.symbols.find_name(SAME_AS)?,
             Atom::Different(..) => self.symbols.find_name(DIFFERENT_FROM)?,
-            Atom::Not { .. } | Atom::BuiltIn { .. } | Atom::Aggregate { .. } => return None,
+            _ => return None,
         };
         let arguments = head.terms().into_iter().map(|term| resolve(term.into(), bound));
         Some(Fact::new(predicate, arguments))

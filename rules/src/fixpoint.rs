@@ -298,10 +298,11 @@ impl Round<'_> {
                 let is_doomed = |row: Row| relation.state(row) & state::DOOMED != 0;
                 retain(block, width, |bound| find(relation, key, bound).is_none_or(is_doomed))
             }
-            Step::Test { built_in, arguments } => {
+            Step::Test { built_in, arguments, negated } => {
                 let symbols = self.symbols.borrow();
                 retain(block, width, |bound| {
-                    literals(&symbols, arguments, bound).is_some_and(|values| built_in.holds(&values))
+                    let values = literals(&symbols, arguments, bound);
+                    values.is_some_and(|values| built_in.holds(&values)) != *negated
                 })
             }
             Step::Compute { built_in, result, arguments } => {
@@ -323,12 +324,11 @@ impl Round<'_> {
                 }
                 block
             }
-            Step::Compare { left, right, equal: true } => {
-                retain(block, width, |bound| resolve(*left, bound) == resolve(*right, bound))
-            }
-            Step::Compare { left, right, equal: false } => {
+            Step::Compare { comparison, left, right } => {
                 let symbols = self.symbols.borrow();
-                retain(block, width, |bound| symbols.differ(resolve(*left, bound), resolve(*right, bound)))
+                retain(block, width, |bound| {
+                    comparison.holds(&symbols, resolve(*left, bound), resolve(*right, bound))
+                })
             }
         })
     }

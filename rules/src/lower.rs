@@ -5,7 +5,7 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::aggregate::Function;
-use crate::plan::{Condition, Lowered, Template};
+use crate::plan::{Comparison, Condition, Lowered, Template};
 use crate::rule::{Atom, Rule, Term, Variable};
 use crate::safety::{Scope, binding, bound_variables};
 use crate::source::Source;
@@ -53,7 +53,12 @@ impl<'a> Lowering<'a> {
 
     pub fn rule(&mut self, position: usize, rule: &Rule) {
         let width = rule.variable_count().max(1);
-        let mut body: Vec<Option<Condition>> = rule.body.iter().map(|atom| self.condition(atom)).collect();
+        let guard = match rule.head[..] {
+            [Atom::Same(left, right)] => Some(Atom::Different(left, right)),
+            _ => None,
+        };
+        let mut body: Vec<Option<Condition>> =
+            rule.body.iter().map(|atom| self.condition(atom, guard.as_ref())).collect();
         for scope in binding(rule).scopes {
             body[scope.position] = self.aggregate(position, rule, &scope, &body);
         }
@@ -83,7 +88,12 @@ impl<'a> Lowering<'a> {
         self.store.relation(predicate, terms.len())
     }
 
-    fn condition(&mut self, atom: &Atom) -> Option<Condition> {
+    /// Lowers a body atom; `guard` is the body atom that is the guard of an equality rule, if there is one. Returns `None`
+    /// for an aggregate.
+    fn condition(&mut self, atom: &Atom, guard: Option<&Atom>) -> Option<Condition> {
+        let compare = |comparison, left: &Term, right: &Term| {
+            Condition::Compare(comparison, (*left).into(), (*right).into())
+        };
         Some(match atom {
             Atom::Relation { predicate, arguments } => {
                 Condition::Relation(self.relation(*predicate, arguments), sources(arguments))
@@ -93,7 +103,11 @@ impl<'a> Lowering<'a> {
             }
             Atom::BuiltIn { built_in, arguments } => Condition::BuiltIn(*built_in, sources(arguments)),
             Atom::Same(left, right) => Condition::Same((*left).into(), (*right).into()),
-            Atom::Different(left, right) => Condition::Different((*left).into(), (*right).into()),
+            Atom::Different(left, right) if guard == Some(atom) => compare(Comparison::Guard, left, right),
+            Atom::Different(left, right) => compare(Comparison::Different, left, right),
+            Atom::NotBuiltIn { built_in, arguments } => Condition::NotBuiltIn(*built_in, sources(arguments)),
+            Atom::NotSame(left, right) => compare(Comparison::NotSame, left, right),
+            Atom::NotDifferent(left, right) => compare(Comparison::NotDifferent, left, right),
             Atom::Aggregate { .. } => return None,
         })
     }
@@ -103,7 +117,7 @@ impl<'a> Lowering<'a> {
             Atom::Relation { predicate, arguments } => (*predicate, arguments.clone()),
             Atom::Same(left, right) => (self.symbols.name(SAME_AS), vec![*left, *right]),
             Atom::Different(left, right) => (self.symbols.name(DIFFERENT_FROM), vec![*left, *right]),
-            Atom::Not { .. } | Atom::BuiltIn { .. } | Atom::Aggregate { .. } => return None,
+            _ => return None,
         };
         Some(Template { relation: self.relation(predicate, &terms), arguments: sources(&terms) })
     }
@@ -119,7 +133,8 @@ impl<'a> Lowering<'a> {
         let Atom::Aggregate { aggregate, result, body } = &rule.body[scope.position] else { return None };
         let variables = [scope.group.as_slice(), &scope.locals].concat();
         let matches = self.anonymous(variables.len());
-        let mut conditions: Vec<Condition> = body.iter().filter_map(|atom| self.condition(atom)).collect();
+        let mut conditions: Vec<Condition> =
+            body.iter().filter_map(|atom| self.condition(atom, None)).collect();
         // Outer conditions bind the variables that the aggregate's own atoms leave open.
         conditions.extend(scope.context.iter().filter_map(|&at| outer_conditions[at].clone()));
         let heads = vec![Template { relation: matches, arguments: columns(&variables) }];

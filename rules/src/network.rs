@@ -199,7 +199,9 @@ fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
 fn bad_pattern(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     let atoms = rule.head.iter().chain(&rule.body).flat_map(|atom| atom.parts().iter().chain([atom]));
     atoms.into_iter().find_map(|atom| {
-        let Atom::BuiltIn { built_in, arguments } = atom else { return None };
+        let (Atom::BuiltIn { built_in, arguments } | Atom::NotBuiltIn { built_in, arguments }) = atom else {
+            return None;
+        };
         let literal = |position: usize| match arguments.get(position)? {
             Term::Constant(symbol) => symbols.as_literal(*symbol),
             Term::Variable(_) => None,
@@ -234,25 +236,40 @@ fn stratify(
     if let Some(same_as) = same_as {
         let named = |relation: &usize| store.relations[*relation].predicate.is_some();
         successors[same_as.0 as usize].extend((0..store.relations.len()).filter(named));
+        for rule in rules.iter().filter(|rule| rule.compares_names()) {
+            successors[same_as.0 as usize].extend(rule.heads.iter().map(|head| head.relation.0 as usize));
+        }
         strata = components(&successors);
     }
+    let name = |relation: RelationId| {
+        store
+            .get(relation)
+            .predicate
+            .map(|predicate| symbols.value(predicate).to_string())
+            .unwrap_or_default()
+    };
     let mut errors = Vec::new();
     for rule in rules {
+        let is_recursive = |relation: RelationId| {
+            rule.heads.iter().any(|head| strata[head.relation.0 as usize] == strata[relation.0 as usize])
+        };
+        if let Some(same_as) = same_as.filter(|same_as| rule.compares_names() && is_recursive(*same_as)) {
+            let (rule, predicate) = (program.rules[rule.rule].identity.clone(), name(same_as));
+            errors.push(Error::Unstratified { rule, predicate });
+        }
         for condition in &rule.body {
             let (Condition::Not(relation, _) | Condition::Aggregate { matches: relation, .. }) = condition
             else {
                 continue;
             };
-            let stratum = strata[relation.0 as usize];
-            if rule.heads.iter().all(|head| strata[head.relation.0 as usize] != stratum) {
+            if !is_recursive(*relation) {
                 continue;
             }
             let identity = program.rules[rule.rule].identity.clone();
             errors.push(if let Condition::Aggregate { function, .. } = condition {
                 Error::UnstratifiedAggregate { rule: identity, aggregate: function.aggregate.name() }
             } else {
-                let name = store.get(*relation).predicate.map(|p| symbols.value(p).to_string());
-                Error::Unstratified { rule: identity, predicate: name.unwrap_or_default() }
+                Error::Unstratified { rule: identity, predicate: name(*relation) }
             });
         }
     }

@@ -11,7 +11,7 @@ use crate::cost::Costs;
 use crate::limits::Budget;
 use crate::source::Source;
 use crate::store::{RelationId, Store, state};
-use crate::symbol::Symbol;
+use crate::symbol::{Symbol, Symbols};
 
 /// State bits of the rows that are invisible to plans that derive facts.
 pub(crate) const HIDDEN: u8 = state::FREE | state::PENDING | state::DOOMED;
@@ -61,9 +61,11 @@ pub(crate) enum Step {
         relation: RelationId,
         key: Vec<Source>,
     },
+    /// Tests that a built-in holds; if `negated`, that it does not hold. All arguments are bound.
     Test {
         built_in: BuiltIn,
         arguments: Vec<Source>,
+        negated: bool,
     },
     Compute {
         built_in: BuiltIn,
@@ -91,10 +93,37 @@ pub(crate) enum Step {
         binds: bool,
     },
     Compare {
+        comparison: Comparison,
         left: Source,
         right: Source,
-        equal: bool,
     },
+}
+
+/// Comparison of two symbols. Under equality, names are compared by their representatives.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Comparison {
+    Same,
+    /// Negation as failure of `Same`.
+    NotSame,
+    /// Certain difference under the unique name assumption.
+    Different,
+    /// Negation as failure of `Different`.
+    NotDifferent,
+    /// Condition that the two names in the head of an equality rule are not equal yet. It only spares the rule
+    /// trivial conclusions, and is no premise of them. So fresh individuals satisfy it, unlike `Different`.
+    Guard,
+}
+
+impl Comparison {
+    pub fn holds(self, symbols: &Symbols, left: Symbol, right: Symbol) -> bool {
+        match self {
+            Self::Same => left == right,
+            Self::NotSame => left != right,
+            Self::Different => symbols.differ(left, right),
+            Self::NotDifferent => !symbols.differ(left, right),
+            Self::Guard => symbols.are_distinct(left, right),
+        }
+    }
 }
 
 /// A join plan: the pattern of the start row (seed), and the steps to a complete match of the rule's
@@ -131,6 +160,11 @@ pub(crate) struct Lowered {
 }
 
 impl Lowered {
+    /// Returns `true` if the rule requires that two names are not equal.
+    pub fn compares_names(&self) -> bool {
+        self.body.iter().any(|condition| matches!(condition, Condition::Compare(Comparison::NotSame, ..)))
+    }
+
     pub fn is_transitivity(heads: &[Template], body: &[Condition]) -> bool {
         let ([head], [Condition::Relation(first, left), Condition::Relation(second, right)]) = (heads, body)
         else {
@@ -153,6 +187,7 @@ pub(crate) enum Condition {
     Relation(RelationId, Vec<Source>),
     Not(RelationId, Vec<Source>),
     BuiltIn(BuiltIn, Vec<Source>),
+    NotBuiltIn(BuiltIn, Vec<Source>),
     /// Result of an aggregate over the rows of a relation that begin with the values of the group.
     Aggregate {
         matches: RelationId,
@@ -160,8 +195,10 @@ pub(crate) enum Condition {
         group: Vec<Source>,
         result: Source,
     },
+    /// Both operands are equal. Binds an operand that is an unbound variable.
     Same(Source, Source),
-    Different(Source, Source),
+    /// A comparison of bound operands.
+    Compare(Comparison, Source, Source),
 }
 
 impl Condition {
@@ -169,7 +206,7 @@ impl Condition {
         match self {
             Self::Relation(relation, _) | Self::Not(relation, _) => Some(*relation),
             Self::Aggregate { matches, .. } => Some(*matches),
-            Self::BuiltIn(..) | Self::Same(..) | Self::Different(..) => None,
+            Self::BuiltIn(..) | Self::NotBuiltIn(..) | Self::Same(..) | Self::Compare(..) => None,
         }
     }
 }
@@ -336,6 +373,9 @@ impl Planner<'_> {
             }
             Condition::Not(relation, sources) => Step::Absent { relation: *relation, key: sources.clone() },
             Condition::BuiltIn(built_in, sources) => built_in_step(*built_in, sources, bound),
+            Condition::NotBuiltIn(built_in, sources) => {
+                Step::Test { built_in: *built_in, arguments: sources.clone(), negated: true }
+            }
             Condition::Aggregate { matches, function, group, result } => {
                 // The columns of the group are the first ones of a match row.
                 let mask = (0..group.len()).fold(0, |mask, column| mask | 1 << column);
@@ -354,9 +394,11 @@ impl Planner<'_> {
                     bound.bind(variable);
                     Step::Equate { variable, source }
                 }
-                (left, right) => Step::Compare { left, right, equal: true },
+                (left, right) => Step::Compare { comparison: Comparison::Same, left, right },
             },
-            Condition::Different(left, right) => Step::Compare { left: *left, right: *right, equal: false },
+            Condition::Compare(comparison, left, right) => {
+                Step::Compare { comparison: *comparison, left: *left, right: *right }
+            }
         }
     }
 }
@@ -369,7 +411,7 @@ fn built_in_step(built_in: BuiltIn, sources: &[Source], bound: &mut Bound) -> St
         }
     }
     match (known.iter().position(|known| !known), sources.first()) {
-        (None, _) => Step::Test { built_in, arguments: sources.to_vec() },
+        (None, _) => Step::Test { built_in, arguments: sources.to_vec(), negated: false },
         (Some(0), Some(&Source::Variable(result))) if built_in.is_function() => {
             Step::Compute { built_in, result, arguments: sources[1..].to_vec() }
         }
@@ -383,7 +425,9 @@ fn is_ready(condition: &Condition, bound: &Bound) -> bool {
         Condition::Same(left, right) => bound.is_bound(*left) || bound.is_bound(*right),
         Condition::BuiltIn(built_in, sources) => built_in.binds(&bound.bound_flags(sources)),
         Condition::Aggregate { group, .. } => bound.are_bound(group),
-        Condition::Relation(_, sources) | Condition::Not(_, sources) => bound.are_bound(sources),
-        Condition::Different(left, right) => bound.is_bound(*left) && bound.is_bound(*right),
+        Condition::Relation(_, sources) | Condition::Not(_, sources) | Condition::NotBuiltIn(_, sources) => {
+            bound.are_bound(sources)
+        }
+        Condition::Compare(_, left, right) => bound.is_bound(*left) && bound.is_bound(*right),
     }
 }

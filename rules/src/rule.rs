@@ -45,6 +45,14 @@ pub enum Atom {
         /// The result comes first, as in `swrlb`.
         arguments: Vec<Term>,
     },
+    /// The built-in does not hold: negation as failure, in bodies only. It thus also holds if an argument is of an
+    /// unsuitable kind, for example an individual or, for a comparison with a number, a string.
+    NotBuiltIn {
+        /// The built-in.
+        built_in: BuiltIn,
+        /// Each variable must be bound by another atom.
+        arguments: Vec<Term>,
+    },
     /// `result` is the aggregate of all matches of a nested conjunction, in bodies only.
     ///
     /// Variables that atoms outside the aggregate bind form the group: each group has its own value.
@@ -65,6 +73,12 @@ pub enum Atom {
     ///
     /// In a head: concludes `owl:differentFrom`.
     Different(Term, Term),
+    /// The terms are not known to denote the same individual: negation as failure of [`Atom::Same`], in bodies only.
+    /// Each variable must be bound by another atom.
+    NotSame(Term, Term),
+    /// The terms are not known to differ: negation as failure of [`Atom::Different`], in bodies only. Each variable
+    /// must be bound by another atom.
+    NotDifferent(Term, Term),
 }
 
 /// Aggregate function over the matches of a conjunction. Each match is a distinct binding of all its
@@ -247,6 +261,30 @@ impl Atom {
         }
     }
 
+    /// Returns `true` if the atom is negated as failure.
+    pub fn is_negated(&self) -> bool {
+        matches!(
+            self,
+            Self::Not { .. } | Self::NotBuiltIn { .. } | Self::NotSame(..) | Self::NotDifferent(..)
+        )
+    }
+
+    /// Returns the negation as failure of the atom. The negation of a data range is the test that the value certainly
+    /// lies outside the range. An aggregate or a negated atom has no negation, and is returned unchanged.
+    #[must_use]
+    pub fn negated(self) -> Self {
+        match self {
+            Self::Relation { predicate, arguments } => Self::Not { predicate, arguments },
+            Self::BuiltIn { built_in: BuiltIn::DataRange, arguments } => {
+                Self::BuiltIn { built_in: BuiltIn::OutsideDataRange, arguments }
+            }
+            Self::BuiltIn { built_in, arguments } => Self::NotBuiltIn { built_in, arguments },
+            Self::Same(left, right) => Self::NotSame(left, right),
+            Self::Different(left, right) => Self::NotDifferent(left, right),
+            other => other,
+        }
+    }
+
     /// Returns the arguments in order. For an aggregate: its result, its aggregated term and the
     /// arguments of its atoms.
     pub fn terms(&self) -> Vec<Term> {
@@ -257,8 +295,12 @@ impl Atom {
             }
             Self::Relation { arguments, .. }
             | Self::Not { arguments, .. }
-            | Self::BuiltIn { arguments, .. } => arguments.clone(),
-            Self::Same(left, right) | Self::Different(left, right) => vec![*left, *right],
+            | Self::BuiltIn { arguments, .. }
+            | Self::NotBuiltIn { arguments, .. } => arguments.clone(),
+            Self::Same(left, right)
+            | Self::Different(left, right)
+            | Self::NotSame(left, right)
+            | Self::NotDifferent(left, right) => vec![*left, *right],
         }
     }
 }

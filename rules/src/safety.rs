@@ -151,7 +151,7 @@ pub(crate) fn check(rule: &Rule) -> Vec<Error> {
     let identity = || rule.identity.clone();
     for atom in &rule.head {
         let what = match atom {
-            Atom::Not { .. } => "a negated atom",
+            atom if atom.is_negated() => "a negated atom",
             Atom::BuiltIn { .. } => "a built-in",
             Atom::Aggregate { .. } => "an aggregate",
             _ => continue,
@@ -171,7 +171,9 @@ pub(crate) fn check(rule: &Rule) -> Vec<Error> {
 fn arity(rule: &Rule, atom: &Atom) -> Option<Error> {
     let identity = || rule.identity.clone();
     match atom {
-        Atom::BuiltIn { built_in, arguments } if !built_in.accepts(arguments.len()) => {
+        Atom::BuiltIn { built_in, arguments } | Atom::NotBuiltIn { built_in, arguments }
+            if !built_in.accepts(arguments.len()) =>
+        {
             let (built_in, count) = (built_in.name(), arguments.len());
             Some(Error::BuiltInArity { rule: identity(), built_in, count })
         }

@@ -56,6 +56,21 @@ impl fmt::Display for Value {
     }
 }
 
+/// Prefix of the names of fresh individuals.
+const FRESH: &str = "urn:metaplan:any:";
+
+/// Returns `true` if two different names certainly denote different individuals.
+fn names_differ(left: &str, right: &str) -> bool {
+    match (left.strip_prefix(FRESH), right.strip_prefix(FRESH)) {
+        (None, None) => true,
+        (Some(left), Some(right)) => match (left.split_once(':'), right.split_once(':')) {
+            (Some((left, _)), Some((right, _))) => left == right,
+            _ => false,
+        },
+        _ => false,
+    }
+}
+
 /// Key of a name in the look-up table. It borrows as `str`, so that a look-up allocates nothing.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 struct NameKey(Box<str>);
@@ -136,14 +151,35 @@ impl Symbols {
         self.values.is_empty()
     }
 
-    /// Returns `true` if two symbols certainly denote different things, under the unique name
-    /// assumption. Returns `false` for two literals whose difference is undecided.
+    /// Returns `true` if two symbols certainly denote different things, under the unique name assumption. Returns
+    /// `false` for two literals whose difference is undecided, and for a fresh individual and any other that is not
+    /// assumed to differ from it; see [`Self::fresh_name`].
     pub(crate) fn differ(&self, left: Symbol, right: Symbol) -> bool {
+        left != right
+            && match (self.value(left), self.value(right)) {
+                (Value::Literal(left), Value::Literal(right)) => left.differs(right),
+                (Value::Name(left), Value::Name(right)) => names_differ(left, right),
+                _ => true,
+            }
+    }
+
+    /// Returns `true` if two symbols are different names or literals with certainly different values.
+    pub(crate) fn are_distinct(&self, left: Symbol, right: Symbol) -> bool {
         left != right
             && match (self.as_literal(left), self.as_literal(right)) {
                 (Some(left), Some(right)) => left.differs(right),
                 _ => true,
             }
+    }
+
+    /// Returns the name of a fresh individual, for conclusions about an arbitrary individual. It can be any
+    /// individual, so the unique name assumption does not apply to it. Only fresh individuals of one `group` with
+    /// different numbers differ.
+    pub fn fresh_name(group: Option<usize>, number: usize) -> String {
+        match group {
+            Some(group) => format!("{FRESH}{group}:{number}"),
+            None => format!("{FRESH}{number}"),
+        }
     }
 
     pub(crate) fn any_ill_typed(&self) -> bool {

@@ -15,7 +15,7 @@ use crate::builtin::BuiltIn;
 use crate::engine::Engine;
 use crate::fact::Fact;
 use crate::literal::{Decimal, Literal};
-use crate::plan::{Condition, Lowered};
+use crate::plan::{Comparison, Condition, Lowered};
 use crate::rule::{Aggregate, RuleIdentity, Variable};
 use crate::source::Source;
 use crate::store::RelationId;
@@ -61,6 +61,13 @@ pub enum Obstacle {
         /// Exact absolute difference of the arguments, if the built-in has two and both are numbers; otherwise
         /// `None`.
         gap: Option<BigRational>,
+    },
+    /// A negated built-in is true.
+    True {
+        /// The built-in.
+        built_in: BuiltIn,
+        /// Arguments of the built-in.
+        arguments: Vec<Symbol>,
     },
     /// An aggregate has another value than the required one, no value, or a value that occurs nowhere else.
     Aggregate {
@@ -120,6 +127,10 @@ impl fmt::Display for DisplayObstacle<'_> {
                     Some(gap) => write!(f, ", by {}", Decimal::from_rational(gap)),
                     None => Ok(()),
                 }
+            }
+            Obstacle::True { built_in, arguments } => {
+                let arguments: Vec<Option<Symbol>> = arguments.iter().copied().map(Some).collect();
+                write!(f, "{}({}) is true", built_in.name(), self.arguments(&arguments))
             }
             Obstacle::Aggregate { aggregate, wanted, found, gap } => {
                 match found {
@@ -237,7 +248,11 @@ impl Search<'_> {
                 |sources: &[Source]| sources.iter().filter(|&&s| value(s, &state.bound).is_some()).count();
             match &self.lowered.body[position] {
                 Condition::Relation(_, sources) => 1 + bound_count(sources),
-                Condition::Not(_, sources) if bound_count(sources) == sources.len() => 100,
+                Condition::Not(_, sources) | Condition::NotBuiltIn(_, sources)
+                    if bound_count(sources) == sources.len() =>
+                {
+                    100
+                }
                 Condition::BuiltIn(built_in, sources) => {
                     let bound_flags: Vec<bool> =
                         sources.iter().map(|&s| value(s, &state.bound).is_some()).collect();
@@ -245,7 +260,7 @@ impl Search<'_> {
                 }
                 Condition::Aggregate { group, .. } if bound_count(group) == group.len() => 100,
                 Condition::Same(a, b) if bound_count(&[*a, *b]) > 0 => 100,
-                Condition::Different(a, b) if bound_count(&[*a, *b]) == 2 => 100,
+                Condition::Compare(_, a, b) if bound_count(&[*a, *b]) == 2 => 100,
                 _ => 0,
             }
         };
@@ -299,11 +314,23 @@ impl Search<'_> {
                 (None, Some(symbol)) => bind(*left, symbol, &mut state.bound),
                 _ => {}
             },
-            Condition::Different(left, right) => {
+            Condition::NotBuiltIn(built_in, sources) => {
+                let symbols = &self.engine.symbols;
+                let arguments: Option<Vec<Symbol>> =
+                    sources.iter().map(|&s| value(s, &state.bound)).collect();
+                let Some(arguments) = arguments else { return };
+                let values: Option<Vec<&Literal>> =
+                    arguments.iter().map(|&symbol| symbols.as_literal(symbol)).collect();
+                if values.is_some_and(|values| built_in.holds(&values)) {
+                    state.obstacles.push(Obstacle::True { built_in: *built_in, arguments });
+                }
+            }
+            Condition::Compare(comparison, left, right) => {
                 if let (Some(left), Some(right)) = (value(*left, &state.bound), value(*right, &state.bound))
-                    && !self.engine.symbols.differ(left, right)
+                    && !comparison.holds(&self.engine.symbols, left, right)
                 {
-                    state.obstacles.push(Obstacle::Equality { left, right, wanted: false });
+                    let wanted = *comparison == Comparison::NotDifferent;
+                    state.obstacles.push(Obstacle::Equality { left, right, wanted });
                 }
             }
             Condition::Aggregate { matches, function, group, result } => {

@@ -417,3 +417,49 @@ fn changes_of_a_clone_and_its_original_are_independent() {
     let eight = fact(&mut what_if, "s(8)");
     assert!(what_if.holds(&eight) && what_if.why(&eight).is_some());
 }
+
+#[test]
+fn negated_built_ins_hold_exactly_if_the_built_ins_do_not() {
+    let rules = "
+        v(?n) ^ not swrlb:lessThan(?n, 5) -> atLeast5(?n) .
+        v(?n) ^ ?k = count { w(?m) ^ not swrlb:lessThan(?m, ?n) } -> countFrom(?n, ?k) .
+        v(?n) ^ not swrlb:add(?n, 1, 2) -> not3(?n) .
+        v(?n) ^ not swrlb:lessThan(?n, 5) ^ not atLeast5(?n) -> never(?n) .
+    ";
+    let script = [
+        "!atLeast5(3)",
+        "?atLeast5(9)",
+        "!never(9)",
+        // A string and an individual are not less than a number.
+        "?atLeast5(\"x\")",
+        "?atLeast5(a)",
+        "!not3(3)",
+        "?not3(9)",
+        "?countFrom(3, 2)",
+        "?countFrom(9, 0)",
+        "+w(9)",
+        "?countFrom(9, 1)",
+        "-v(9)",
+        "!atLeast5(9)",
+    ];
+    check(rules, "v(3), v(9), v(\"x\"), v(a), w(1), w(3), w(4)", &script);
+}
+
+#[test]
+fn negated_comparisons_of_names_are_complements() {
+    let rules = "
+        p(?x) ^ p(?y) ^ sameAs(?x, ?y) -> same(?x, ?y) . p(?x) ^ p(?y) ^ not sameAs(?x, ?y) -> notSame(?x, ?y) .
+        p(?x) ^ p(?y) ^ differentFrom(?x, ?y) -> different(?x, ?y) .
+        p(?x) ^ p(?y) ^ not <http://www.w3.org/2002/07/owl#differentFrom>(?x, ?y) -> notDifferent(?x, ?y) .";
+    let script = [
+        "?same(a, a)",
+        "!notSame(a, a)",
+        "!same(a, b)",
+        "?notSame(a, b)",
+        "!different(a, a)",
+        "?notDifferent(a, a)",
+        "?different(a, b)",
+        "!notDifferent(a, b)",
+    ];
+    check(rules, "p(a), p(b)", &script);
+}

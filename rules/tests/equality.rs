@@ -354,3 +354,50 @@ fn pairs_are_derived_again_when_constants_of_rules_become_equal() {
     let pair = fact(&mut engine, "sameAs(a, c)");
     assert!(engine.holds(&pair), "{:?}", displayed(&engine));
 }
+
+#[test]
+fn negated_comparisons_follow_changes_of_equality() {
+    let all = "= p(a) ^ p(b) ^ q(a, b) ^ q(b, a)";
+    check(
+        "p(?x) ^ p(?y) ^ not sameAs(?x, ?y) -> q(?x, ?y)",
+        "p(a), p(b)",
+        &[all, "+sameAs(a, b)", "= p(a) ^ p(b)", "-sameAs(a, b)", all],
+    );
+    check(
+        "not sameAs(a, b) ^ p(?x) -> q(?x, ?x) . r(?x) -> sameAs(a, b)",
+        "p(a)",
+        &["= p(a) ^ q(a, a)", "+r(c)", "= p(a) ^ p(b) ^ r(c)", "-r(c)", "= p(a) ^ q(a, a)"],
+    );
+    let one =
+        |number: u8| format!("= p(a) ^ p(b) ^ n(\"{number}\"^^http://www.w3.org/2001/XMLSchema#integer)");
+    check(
+        "?n = count { p(?x) ^ not sameAs(?x, b) } -> n(?n)",
+        "p(a), p(b)",
+        &[&one(1), "+sameAs(a, b)", &one(0), "-sameAs(a, b)", &one(1)],
+    );
+    let differ = "differentFrom(a, b) ^ differentFrom(b, a)";
+    check(
+        "p(?x) ^ p(?y) ^ not differentFrom(?x, ?y) -> q(?x, ?y)",
+        "p(a), p(b)",
+        &[
+            "= p(a) ^ p(b) ^ q(a, a) ^ q(a, b) ^ q(b, a) ^ q(b, b)",
+            "+differentFrom(a, b)",
+            &format!("= p(a) ^ p(b) ^ q(a, a) ^ q(b, b) ^ {differ}"),
+        ],
+    );
+}
+
+#[test]
+fn negation_through_equality_is_an_error() {
+    for rules in [
+        "p(?x) ^ p(?y) ^ not sameAs(?x, ?y) -> sameAs(?x, ?y)",
+        "p(?x) ^ not sameAs(?x, b) -> q(?x) . q(?x) -> sameAs(?x, b)",
+        "r(?n) ^ ?n = count { p(?x) ^ not sameAs(?x, b) } -> sameAs(a, b)",
+    ] {
+        let mut symbols = Symbols::new();
+        let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
+        let program = program.with_equality(&mut symbols);
+        let errors = Engine::new(symbols, program, []).expect_err(rules);
+        assert!(errors.iter().any(|error| error.code() == "R206"), "{rules}: {errors}");
+    }
+}

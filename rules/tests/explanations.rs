@@ -8,6 +8,7 @@ const RULES: &str = "
     [too low] needs(?fd, ?least) ^ measured(?m, ?value) ^ swrlb:lessThan(?value, ?least) -> broken(?fd) .
     [failed] requires(?fd, ?c) ^ failed(?c) -> broken(?fd) .
     [twin] twin(?fd, ?other) ^ differentFrom(?fd, ?other) -> broken(?fd) .
+    [high] measured(?fd, ?value) ^ not swrlb:lessThan(?value, 1) -> high(?fd) .
     [both] usable(?fd) ^ design(?fd) -> ready(?fd) .
 ";
 const STATED: &str =
@@ -30,8 +31,10 @@ fn the_nearest_match_is_reported() {
     check("usable(a)", &[]);
     check("unheard(a)", &[]);
     let decimal = |number: &str| format!("\"{number}\"^^<http://www.w3.org/2001/XMLSchema#decimal>");
+    let integer = |number: &str| decimal(number).replace("decimal", "integer");
     let low = format!("lessThan({}, {}) is false, by 0.25", decimal("0.75"), decimal("0.5"));
     let failed = ["missing <requires>(<a>, ?)", "missing <failed>(?)"];
+    check("high(m)", &[&[&format!("lessThan({}, {}) is true", decimal("0.75"), integer("1"))]]);
     check("broken(a)", &[&[&low], &failed, &["<a> is the same as <a>"]]);
 }
 
@@ -40,7 +43,7 @@ fn derivations_print_as_trees() {
     let mut engine = engine(RULES, STATED).expect("rules");
     let fact = fact(&mut engine, "ready(a)");
     let displayed = engine.why(&fact).expect("it holds").display(engine.symbols()).to_string();
-    let expected = "<ready>(<a>) by rule test#4 (both)
+    let expected = "<ready>(<a>) by rule test#5 (both)
   <usable>(<a>) by rule test#0 (usable)
     not <broken>(<a>)
     <design>(<a>) is stated

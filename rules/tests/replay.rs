@@ -152,3 +152,41 @@ fn derivations_use_names_as_written_in_rules() {
         }
     }
 }
+
+/// A negated built-in or comparison needs no support. It is evaluated, both for the steps and for missing conclusions.
+#[test]
+fn negated_tests_are_replayed() {
+    let rules = "v(?x, ?n) ^ not swrlb:lessThan(?n, 5) -> high(?x) . v(?x, ?n) ^ v(?y, ?n) ^ not sameAs(?x, ?y) -> twin(?x, ?y) .";
+    let mut symbols = Symbols::new();
+    let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
+    let program = program.with_equality(&mut symbols);
+    let given = facts(&mut symbols, "v(a, 3), v(b, 9), v(c, 9), v(d, 3), sameAs(a, d)");
+    let engine = Engine::new(symbols, program, given).expect("safe");
+    let replayed = |derivation: &Derivation| {
+        let result = replay(engine.program(), &mut engine.symbols().clone(), &stated(&engine), derivation);
+        result.map(|replayed| replayed.derived).map_err(|fault| fault.to_string())
+    };
+    let derivation = engine.everything();
+    // `high` and `twin` of `b` and `c`; `v` and `sameAs` of `a` and `d` hold by equality.
+    assert_eq!(replayed(&derivation), Ok(4));
+    let mut missing = derivation.clone();
+    without("<twin>(<b>, <c>)")(&mut missing, &engine);
+    let fault = replayed(&missing).expect_err("a conclusion is missing");
+    assert!(fault.contains("<twin>(<b>, <c>) follows by rule test#1"), "{fault}");
+    let mut wrong = derivation.clone();
+    let [a, high] = ["<v>(<a>, ", "<high>(<b>)"].map(|start| {
+        let shown = |step: &metaplan_rules::DerivationStep| step.fact.display(engine.symbols()).to_string();
+        wrong.steps.iter().position(|step| shown(step).starts_with(start)).expect("a step")
+    });
+    let (mut step, premise) = (wrong.steps[high].clone(), wrong.steps[a].fact.clone());
+    step.fact.arguments[0] = premise.arguments[0];
+    if let Reason::Rule { bindings, supports, .. } = &mut step.reason {
+        *supports = vec![a];
+        for ((_, value), argument) in bindings.iter_mut().zip(&premise.arguments) {
+            *value = *argument;
+        }
+    }
+    wrong.steps.push(step);
+    let fault = replayed(&wrong).expect_err("3 is less than 5");
+    assert!(fault.contains("rule test#0 does not apply"), "{fault}");
+}

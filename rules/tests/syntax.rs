@@ -14,6 +14,7 @@ fn printed_rules_read_back_the_same() {
         [aggregates] ex:p(?x, ?y) ^ ?n = count { ex:q(?x, ?z) ^ not ex:r(?z) } ^ 0 = sum{?n|ex:s(?n, ?y)}
             ^ "1.5"^^xsd:decimal = min { ?w | ex:v(?x, ?w) } ^ ?n = max { 7 | ex:r(ex:a) } -> ex:A(?n) .
         [range] ex:p(?x, ?y) ^ xsd:decimal(?y) ^ rdf:PlainLiteral(?x) ^ not xsd:string(?x) -> ex:q(?x) .
+        [negated] ex:p(?x, ?y) ^ not swrlb:lessThan(?y, 3) ^ not sameAs(?x, ex:i) ^ not differentFrom(?x, ex:i) -> .
         # the end
     "#;
     let unusual = unusual.replace("?x.1", "?x");
@@ -102,6 +103,13 @@ fn errors_have_codes_and_positions() {
         ],
     );
     check(
+        "p(?x) ^ not swrlb:lessThen(?x, 3) -> q(?x) . p(?x) ^ not swrlb:member(?x, ?x) -> q(?x)",
+        &[
+            "test:1:13: R104 there is no built-in `lessThen`; did you mean `lessThan`?",
+            "test:1:58: R104 built-in `member` works on lists, which the engine does not support",
+        ],
+    );
+    check(
         "@prefix t: <http://swrl.stanford.edu/ontologies/built-ins/3.3/abox.owl#> .\nt:add(?x, ?y, 1, \"Days\") -> q(?x)",
         &[
             "test:2:1: R104 built-in <http://swrl.stanford.edu/ontologies/built-ins/3.3/abox.owl#add> belongs to a \
@@ -131,6 +139,15 @@ fn unsafe_rules_are_refused_all_at_once() {
         "p(?x) ^ swrlb:add(?y, ?x) -> q(?y)",
         &["R204 rule test#0: built-in add does not take 2 arguments"],
     );
+    check(
+        "p(?x) ^ not swrlb:lessThan(?x) -> q(?x) . p(?x) ^ not swrlb:lessThan(?x, ?y) ^ not sameAs(?x, ?z) -> q(?x)",
+        &[
+            "R204 rule test#0: built-in lessThan does not take 1 arguments",
+            "R203 rule test#1: variable ?y is only tested, never bound",
+            "R203 rule test#1: variable ?z is only tested, never bound",
+        ],
+    );
+    check("p(?x) -> not swrlb:lessThan(?x, 3)", &["R205 rule test#0: a head may not contain a negated atom"]);
     check("p(?x) -> swrlb:lessThan(?x, 3)", &["R205 rule test#0: a head may not contain a built-in"]);
     check(
         "p(?x) ^ not q(?x) -> r(?x) . r(?x) -> q(?x)",

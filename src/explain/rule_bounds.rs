@@ -194,7 +194,9 @@ impl Reader<'_> {
         let mut is_examined = !reads.has_constant;
         for atom in atoms(rule) {
             let (built_in, arguments) = match atom {
-                Atom::BuiltIn { built_in, arguments } => (*built_in, arguments),
+                Atom::BuiltIn { built_in, arguments } | Atom::NotBuiltIn { built_in, arguments } => {
+                    (*built_in, arguments)
+                }
                 Atom::Not { predicate, .. } => {
                     is_examined &=
                         !carriers.contains(predicate) && !self.is_named(*predicate, &VALUE_PROPERTIES);
@@ -218,7 +220,8 @@ impl Reader<'_> {
                 alteration,
                 is_deciding,
                 designs: designs.clone(),
-                is_harmful: is_direct && !is_satisfied,
+                // An alteration changes the outcome of a comparison and of its negation alike.
+                is_harmful: is_direct && is_satisfied == atom.is_negated(),
             }));
         }
         let concludes_value = rule.head.iter().any(|atom| {

@@ -1,6 +1,6 @@
 //! Assumes and proves that an individual is in a class expression.
 
-use rules::{Delta, Engine, Error, Fact, Literal};
+use rules::{Delta, Engine, Error, Fact, Literal, Symbols};
 
 use super::prover::{
     ProofResult, Prover, contradiction, edge, explain, literal, member, monotone, same, value, with_facts,
@@ -85,10 +85,11 @@ impl Prover {
         next: &mut usize,
     ) -> Result<Vec<Engine>, Error> {
         let mut copy = engine.clone();
+        let group = *next + 1;
         let names: Vec<Iri> = (0..count)
             .map(|_| {
                 *next += 1;
-                Self::fresh(*next)
+                Symbols::fresh_name(Some(group), *next).into()
             })
             .collect();
         let mut facts: Vec<Fact> =
@@ -174,7 +175,7 @@ impl Prover {
             C::DataCardinality(Bound::Max, n @ 0..=8, property, _) => {
                 let facts = (0..=*n).map(|_| {
                     *next += 1;
-                    value(&mut copy, property, individual, Literal::fresh(*next))
+                    value(&mut copy, property, individual, Literal::distinct(*next))
                 });
                 let facts: Vec<Fact> = facts.collect();
                 return Ok(refuted(&[with_facts(&copy, facts)?]));

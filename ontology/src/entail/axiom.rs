@@ -1,10 +1,12 @@
 //! Proves axioms: the conditions of an axiom become assumptions, i.e. facts in a copy of the engine. Its
 //! conclusions become goals, which the copy has to derive.
 
+use std::collections::BTreeSet;
+
 use rules::{Engine, Error, Fact, Literal};
 
 use super::assume::{pairwise_different, refuted};
-use super::prover::{Answer, ProofResult, Prover, edge, explain, literal, same, value, with_facts};
+use super::prover::{Answer, ProofResult, Prover, edge, explain, literal, named, same, value, with_facts};
 use crate::owl::{Axiom, Characteristic, ClassExpression, Iri, ObjectPropertyExpression as Property};
 use crate::vocab::owl;
 
@@ -54,6 +56,9 @@ impl Prover {
                     next += 1;
                     facts.extend([&x, &y].map(|end| value(&mut copy, property, end, Literal::fresh(next))));
                 }
+                // Keys concern only individuals with a name.
+                let symbols: BTreeSet<_> = facts.iter().flat_map(|fact| fact.arguments.clone()).collect();
+                facts.extend(symbols.into_iter().map(|symbol| named(&mut copy, symbol)));
                 let mut reasons = String::new();
                 for case in Self::assume(&with_facts(&copy, facts)?, class, &x, &mut next)? {
                     for mut case in Self::assume(&case, class, &y, &mut next)? {
@@ -166,18 +171,19 @@ impl Prover {
     }
 
     fn data_properties(&self, axiom: &Axiom) -> ProofResult {
-        let assumed = |properties: &[(&Iri, usize)]| -> Result<Engine, Error> {
+        let assumed_values = |properties: &[&Iri], values: &[Literal]| -> Result<Engine, Error> {
             let mut copy = self.monotone.clone();
-            let facts: Vec<Fact> = properties
-                .iter()
-                .map(|(property, number)| {
-                    value(&mut copy, property, &Self::fresh(0), Literal::fresh(*number))
-                })
+            let edges = properties.iter().zip(values);
+            let facts: Vec<Fact> = edges
+                .map(|(property, object)| value(&mut copy, property, &Self::fresh(0), object.clone()))
                 .collect();
             with_facts(&copy, facts)
         };
+        // One value of all properties.
+        let assumed =
+            |properties: &[&Iri]| assumed_values(properties, &vec![Literal::fresh(1); properties.len()]);
         let implies = |(sub, sup): (&Iri, &Iri)| -> ProofResult {
-            let mut copy = assumed(&[(sub, 1)])?;
+            let mut copy = assumed(&[sub])?;
             let goal = value(&mut copy, sup, &Self::fresh(0), Literal::fresh(1));
             Ok(explain_or_refute(&copy, &goal))
         };
@@ -189,14 +195,14 @@ impl Prover {
             Axiom::DisjointDataProperties(properties) => {
                 let pairs = properties.iter().enumerate();
                 let pairs = pairs.flat_map(|(index, p)| properties[index + 1..].iter().map(move |q| (p, q)));
-                prove_all(pairs, |(p, q)| Ok(refuted(&[assumed(&[(p, 1), (q, 1)])?])))
+                prove_all(pairs, |(p, q)| Ok(refuted(&[assumed(&[p, q])?])))
             }
             Axiom::FunctionalDataProperty(property) => {
-                Ok(refuted(&[assumed(&[(property, 1), (property, 2)])?]))
+                Ok(refuted(&[assumed_values(&[property; 2], &[1, 2].map(Literal::distinct))?]))
             }
             Axiom::DataPropertyRange(property, range) => Ok(self.range(property, range)?),
             Axiom::DataPropertyDomain(property, class) => {
-                Self::is_in(&assumed(&[(property, 1)])?, class, &Self::fresh(0), &mut 1)
+                Self::is_in(&assumed(&[property])?, class, &Self::fresh(0), &mut 1)
             }
             _ => Ok(None),
         }

@@ -2,8 +2,10 @@
 //! properties are looked up. Most other axioms are proved with *fresh individuals*, about which only the
 //! axiom's condition is assumed, or by *refutation*: the negation is assumed and contradicts the knowledge.
 //!
-//! The procedure is sound, because the rules are sound for the assumed individuals. Rules with a negation or an
-//! aggregate take no part in proofs from assumptions, and no built-in holds of a fresh value. The procedure is
+//! The procedure is sound, because the rules are sound for the assumed individuals. Keys apply only to individuals with a
+//! name. Rules with a negation or an
+//! aggregate take no part in proofs from assumptions, no built-in holds of a fresh value, and fresh values and individuals
+//! differ only if this is assumed. The procedure is
 //! incomplete, because the rules are those of OWL 2 RL.
 
 mod assume;
@@ -19,7 +21,7 @@ use crate::error::Warning;
 use crate::horned::UNUSED_CLASS;
 use crate::owl::{ANONYMOUS, Annotation, AnnotationValue, Axiom, Iri, Ontology};
 use crate::vocab::owl;
-use prover::{Prover, contradiction};
+use prover::Prover;
 
 pub use prover::Answer;
 pub use schema::{Schema, SchemaEntity, schema};
@@ -41,20 +43,20 @@ pub struct Entailment {
 /// Returns an error if the evaluation of the rules exceeds its budget or is interrupted.
 pub fn entailments(engine: &Engine, conclusions: &Ontology) -> Result<Vec<Entailment>, Error> {
     let prover = Prover::new(engine)?;
-    let inconsistency = contradiction(&prover.base);
+    let inconsistency = prover.inconsistency.as_ref();
     let mut entailments = Vec::new();
     let (open, closed): (Vec<_>, Vec<_>) =
         conclusions.axioms.iter().map(|annotated| &annotated.axiom).partition(|axiom| has_anonymous(axiom));
     for axiom in closed {
         // Inconsistent knowledge entails every statement.
-        let answer = match &inconsistency {
+        let answer = match inconsistency {
             Some(reason) => Answer::Follows(format!("everything does, because {reason}\n")),
             None => prover.axiom(axiom)?,
         };
         entailments.push(Entailment { statement: axiom.to_string(), answer });
     }
     if !open.is_empty() {
-        let answer = match &inconsistency {
+        let answer = match inconsistency {
             Some(reason) => Answer::Follows(format!("everything does, because {reason}\n")),
             None => prover.conjunctive_query(&open)?,
         };

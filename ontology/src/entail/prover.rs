@@ -1,7 +1,10 @@
 //! The prover's knowledge base, and constructors for facts that are assumed or proved.
 
-use rules::{Atom, Engine, Error, Fact, Literal, Program, Rule, Symbol};
+use std::collections::BTreeSet;
 
+use rules::{Atom, Delta, Engine, Error, Fact, Literal, Program, Rule, Symbol, Symbols, Term};
+
+use crate::lower::AXIOM_SOURCE;
 use crate::owl::{Iri, ObjectPropertyExpression};
 use crate::vocab::owl;
 
@@ -33,6 +36,9 @@ pub(super) struct Prover {
     pub(super) base: Engine,
     /// `base` for proofs from assumptions; see [`monotone`].
     pub(super) monotone: Engine,
+    /// Reason why the knowledge is inconsistent. `base` alone does not show that two names are equal which must differ
+    /// under the unique name assumption.
+    pub(super) inconsistency: Option<String>,
 }
 
 pub(super) type ProofResult = Result<Option<String>, Error>;
@@ -45,13 +51,14 @@ impl Prover {
             base.set_program(program).map_err(|errors| errors.into_vec().remove(0))?;
         }
         let monotone = monotone(&base)?;
-        Ok(Self { base, monotone })
+        let inconsistency = contradiction(engine).or_else(|| contradiction(&base));
+        Ok(Self { base, monotone, inconsistency })
     }
 
     /// Returns the name of a fresh individual, which occurs nowhere else. `number` distinguishes
     /// the fresh individuals of one proof.
     pub(super) fn fresh(number: usize) -> Iri {
-        format!("urn:metaplan:any:{number}").into()
+        Symbols::fresh_name(None, number).into()
     }
 }
 
@@ -83,25 +90,58 @@ pub(super) fn literal(literal: &crate::owl::Literal) -> Literal {
     Literal::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
-/// Returns a copy of the engine without the rules that have a negation or an aggregate. These rules draw conclusions from
-/// the absence of facts, but facts about a fresh individual are absent because it represents all individuals.
+/// Relation of the individuals and values that the knowledge base names.
+const NAMED: &str = "urn:metaplan:named";
+
+/// Returns the fact that an individual or a value has a name, so that keys apply to it.
+pub(super) fn named(engine: &mut Engine, symbol: Symbol) -> Fact {
+    Fact::new(engine.symbols_mut().name(NAMED), [symbol])
+}
+
+/// Returns a copy of the engine with the rules that are sound for fresh individuals. Rules with a negation or an
+/// aggregate are removed: they draw conclusions from the absence of facts, but facts about a fresh individual are absent
+/// because it represents all individuals. Keys are restricted to individuals with a name, as OWL defines them; a fresh
+/// individual can be one without a name.
 pub(super) fn monotone(engine: &Engine) -> Result<Engine, Error> {
-    let is_monotone =
-        |rule: &Rule| !rule.body.iter().any(|atom| matches!(atom, Atom::Not { .. } | Atom::Aggregate { .. }));
+    let is_closed_world = |atom: &Atom| atom.is_negated() || matches!(atom, Atom::Aggregate { .. });
+    let is_monotone = |rule: &Rule| !rule.body.iter().any(is_closed_world);
     let (mut copy, program) = (engine.clone(), engine.program());
-    if !program.rules.iter().all(is_monotone) {
-        let rules = program.rules.iter().filter(|rule| is_monotone(rule)).cloned().collect();
-        copy.set_program(Program { rules, equality: program.equality })
-            .map_err(|errors| errors.into_vec().remove(0))?;
+    let predicate = engine.symbols().find_name(NAMED);
+    let is_restriction =
+        |atom: &Atom| matches!(atom, Atom::Relation { predicate: other, .. } if Some(*other) == predicate);
+    let is_open_key = |rule: &Rule| is_key(rule) && !rule.body.iter().any(is_restriction);
+    let has_open_keys = program.rules.iter().any(is_open_key);
+    if program.rules.iter().all(is_monotone) && !has_open_keys {
+        return Ok(copy);
     }
+    let mut rules: Vec<Rule> = program.rules.iter().filter(|rule| is_monotone(rule)).cloned().collect();
+    if has_open_keys {
+        let predicate = copy.symbols_mut().name(NAMED);
+        for rule in rules.iter_mut().filter(|rule| is_open_key(rule)) {
+            let atoms = rule.body.iter().filter(|atom| matches!(atom, Atom::Relation { .. }));
+            let terms = atoms.flat_map(Atom::terms).filter(|term| term.as_variable().is_some());
+            let variables: BTreeSet<Term> = terms.collect();
+            rule.body.extend(variables.into_iter().map(|variable| Atom::relation(predicate, [variable])));
+        }
+        let symbols: BTreeSet<Symbol> = engine.facts().flat_map(|fact| fact.arguments).collect();
+        let insert = symbols.into_iter().map(|symbol| Fact::new(predicate, [symbol])).collect();
+        copy.apply(Delta { insert, delete: Vec::new() })?;
+    }
+    copy.set_program(Program { rules, equality: program.equality })
+        .map_err(|errors| errors.into_vec().remove(0))?;
     Ok(copy)
+}
+
+fn is_key(rule: &Rule) -> bool {
+    let label = rule.identity.label.as_deref().unwrap_or_default();
+    *rule.identity.source == *AXIOM_SOURCE && label.starts_with("HasKey(")
 }
 
 /// Returns a copy of the engine with assumed facts, and with the rules of [`monotone`].
 pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>) -> Result<Engine, Error> {
     let mut copy = monotone(engine)?;
     let insert = facts.into_iter().collect();
-    copy.apply(rules::Delta { insert, delete: Vec::new() })?;
+    copy.apply(Delta { insert, delete: Vec::new() })?;
     Ok(copy)
 }
 

@@ -220,8 +220,9 @@ impl AxiomLowering<'_, '_> {
             for (conditions, head) in &conclusions {
                 let mut body: Conjunction = body.iter().chain(conditions).cloned().collect();
                 // A contradiction without a condition (`Thing ⊑ Nothing`) needs no individual. Any other conclusion
-                // is about `x`, which the body has to bind.
-                if body.is_empty() && !head.is_empty() {
+                // is about `x`, which the body has to bind. A difference binds no variable.
+                let is_open = body.iter().all(|atom| matches!(atom, Atom::Different(..)));
+                if is_open && !(body.is_empty() && head.is_empty()) {
                     body.push(self.context.thing(x));
                 }
                 self.rule(body, head.clone(), &variables);
@@ -290,7 +291,7 @@ impl AxiomLowering<'_, '_> {
     }
 
     /// Adds the rules of a key axiom: two members of the class with equal values of all key properties are
-    /// the same individual (rule prp-key). Adds no rules under the unique name assumption.
+    /// the same individual (rule prp-key).
     fn key(&mut self, class: &ClassExpression, objects: &[Property], data: &[Iri]) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));

@@ -5,7 +5,7 @@ use rules::{Atom, Term};
 
 use super::context::{Conjunction, Context, Equality, INTERNAL, Variables, cross, identity};
 use super::range;
-use crate::owl::{Axiom, Bound, ClassExpression, DataRange, ObjectPropertyExpression};
+use crate::owl::{Axiom, Bound, ClassExpression, DataRange, Iri, ObjectPropertyExpression};
 use crate::vocab::owl;
 
 /// Consequences of membership in a class: pairs of additional conditions and head atoms. An empty head
@@ -177,13 +177,7 @@ pub(crate) fn conclusions(
             }
             consequences
         }
-        // As for functional properties, different names are not concluded to be equal.
-        C::OneOf(individuals) if individuals.len() == 1 && context.equality == Equality::UniqueNames => {
-            Vec::new()
-        }
-        C::OneOf(individuals) if individuals.len() == 1 => {
-            heads(Atom::Same(x, context.constant(&individuals[0])))
-        }
+        C::OneOf(individuals) => one_of(context, individuals, x),
         C::HasValue(property, individual) => {
             let value = context.constant(individual);
             heads(context.property(property, x, value))
@@ -252,10 +246,25 @@ pub(crate) fn conclusions(
             heads(context.relation(property, [x, value]))
         }
         C::DataSomeValuesFrom(..) | C::DataCardinality(Bound::Min, 1, ..) => context.gap(EXISTS),
-        C::UnionOf(_) | C::OneOf(_) => context.gap("a union as a conclusion"),
+        C::UnionOf(_) => context.gap("a union as a conclusion"),
         C::Cardinality(..) | C::DataCardinality(..) => {
             only_included(context, class, x, "a cardinality as a conclusion")
         }
+    }
+}
+
+fn one_of(context: &mut Context, individuals: &[Iri], x: Term) -> Conclusions {
+    match (context.equality, individuals) {
+        // As for functional properties, different names are not concluded to be equal.
+        (Equality::UniqueNames, _) => {
+            let differs = |individual: &Iri| Atom::Different(x, context.constant(individual));
+            vec![(individuals.iter().map(differs).collect(), Vec::new())]
+        }
+        (Equality::UncheckedUniqueNames, [_]) => Vec::new(),
+        (Equality::Owl, [individual]) => {
+            vec![(Vec::new(), vec![Atom::Same(x, context.constant(individual))])]
+        }
+        _ => context.gap("a union as a conclusion"),
     }
 }
 
@@ -266,15 +275,23 @@ fn at_most_one(
     x: Term,
     variables: &mut Variables,
 ) -> Conclusions {
-    // As for functional properties, different names are not concluded to be equal.
-    if context.equality == Equality::UniqueNames {
+    if context.equality == Equality::UncheckedUniqueNames {
         return Vec::new();
     }
     let (y, z) = (variables.fresh("y"), variables.fresh("z"));
     let edges = vec![vec![context.property(property, x, y), context.property(property, x, z)]];
     let bodies = cross(&edges, &brief_condition(context, filler, y, variables));
     let bodies = cross(&bodies, &brief_condition(context, filler, z, variables));
-    bodies.into_iter().map(|body| (body, vec![Atom::Same(y, z)])).collect()
+    let equality = context.equality;
+    let conclusion = |mut body: Conjunction| match equality {
+        // As for functional properties, different names are not concluded to be equal.
+        Equality::UniqueNames => {
+            body.push(Atom::Different(y, z));
+            (body, Vec::new())
+        }
+        _ => (body, vec![Atom::Same(y, z)]),
+    };
+    bodies.into_iter().map(conclusion).collect()
 }
 
 fn all_values(

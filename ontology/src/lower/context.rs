@@ -25,8 +25,12 @@ pub enum Equality {
     /// Two names can denote the same individual: the semantics of OWL.
     #[default]
     Owl,
-    /// Different names denote different individuals: the semantics of databases and of PDDL.
+    /// Different names denote different individuals: the semantics of databases and of PDDL. The knowledge is
+    /// inconsistent if an axiom makes two names equal.
     UniqueNames,
+    /// Different names denote different individuals, but axioms that make two names equal have no consequences. So
+    /// several values of a functional object property are accepted.
+    UncheckedUniqueNames,
 }
 
 pub(crate) type Conjunction = Vec<Atom>;
@@ -181,7 +185,8 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Adds the rule `body → pair[0] owl:sameAs pair[1]`; does nothing under the unique name assumption.
+    /// Adds the rule `body → pair[0] owl:sameAs pair[1]`. Under the unique name assumption, adds the constraint that the
+    /// body does not hold for two different names.
     pub(crate) fn merge(
         &mut self,
         identity: &RuleIdentity,
@@ -189,18 +194,20 @@ impl<'a> Context<'a> {
         body: Conjunction,
         variables: &Variables,
     ) {
-        if self.equality == Equality::Owl {
-            // `Different` compares symbols here: the rule must not conclude that an individual is the same as
-            // itself.
-            let body = body.into_iter().chain([Atom::Different(pair[0], pair[1])]).collect();
-            self.rule(identity, vec![Atom::Same(pair[0], pair[1])], body, variables);
+        // `Different` compares symbols here. In an equality rule it is only a guard: the rule must not conclude that an
+        // individual is the same as itself.
+        let body = body.into_iter().chain([Atom::Different(pair[0], pair[1])]).collect();
+        match self.equality {
+            Equality::Owl => self.rule(identity, vec![Atom::Same(pair[0], pair[1])], body, variables),
+            Equality::UniqueNames => self.rule(identity, Vec::new(), body, variables),
+            Equality::UncheckedUniqueNames => {}
         }
     }
 
     pub(crate) fn different(&mut self, first: Term, second: Term) -> Atom {
         match self.equality {
             Equality::Owl => self.relation(owl::DIFFERENT_FROM, [first, second]),
-            Equality::UniqueNames => Atom::Different(first, second),
+            Equality::UniqueNames | Equality::UncheckedUniqueNames => Atom::Different(first, second),
         }
     }
 

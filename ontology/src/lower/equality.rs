@@ -5,9 +5,10 @@
 //! `differentFrom` holds if it is stated, or follows from disjoint classes or from different values of functional or
 //! inverse functional properties. It is derived only if a rule depends on it.
 //!
-//! Under the unique name assumption ([`UniqueNames`](super::Equality::UniqueNames)) the rules of this file are
-//! not added: a functional object property, a cardinality of at most 1, and a class of one individual have no
-//! consequences, and any two names differ.
+//! Under the unique name assumption ([`UniqueNames`](super::Equality::UniqueNames)) any two names differ, and the only
+//! rule of this file is the constraint that no two names are the same. A functional object property, a cardinality of at
+//! most 1, a key, and a class of listed individuals become constraints, too. Without the check
+//! ([`UncheckedUniqueNames`](super::Equality::UncheckedUniqueNames)) none of these has a consequence.
 
 use std::collections::HashSet;
 
@@ -27,12 +28,12 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     let depends = |rule: &Rule| {
         // The constraint against `differentFrom(x, x)` alone does not require derived differences.
         let is_difference = |atom: &Atom| match atom {
-            Atom::Relation { predicate, arguments } => {
+            Atom::Relation { predicate, arguments } | Atom::Not { predicate, arguments } => {
                 *predicate == different && arguments.first() != arguments.last()
             }
             _ => false,
         };
-        rule.body.iter().any(is_difference)
+        rule.body.iter().any(|atom| is_difference(atom) || atom.parts().iter().any(is_difference))
     };
     let merges =
         context.rules.iter().any(merges_names) || context.facts.iter().any(|fact| fact.predicate == same_as);
@@ -43,6 +44,14 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
         entities(context);
     }
     merges
+}
+
+/// Adds the constraint that no two different names are the same, for the unique name assumption.
+pub(crate) fn forbid(context: &mut Context) {
+    let mut variables = Variables::default();
+    let (x, y) = (variables.fresh("x"), variables.fresh("y"));
+    let body = vec![context.relation(owl::SAME_AS, [x, y]), Atom::Different(x, y)];
+    context.rule(&identity("unique names", 0), Vec::new(), body, &variables);
 }
 
 /// Adds rule eq-rep of OWL 2 RL for classes and properties that are individuals, too: names that become equal

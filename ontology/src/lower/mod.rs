@@ -23,13 +23,13 @@ mod range;
 mod swrl;
 mod vocabulary;
 
-use rules::{Atom, Error, Fact, Program, Rule, RuleIdentity, Symbols};
+use rules::{Atom, Error, Fact, Program, Rule, RuleIdentity, Symbols, Term};
 use tracing::field::Empty;
 use tracing::info_span;
 
 use crate::error::Warning;
-use crate::owl::{AnnotatedAxiom, Ontology};
-use context::Context;
+use crate::owl::{AnnotatedAxiom, DataRange, EntityKind, Iri, Ontology};
+use context::{Conjunction, Context, cross};
 
 pub use context::{AXIOM_SOURCE, Equality, INTERNAL};
 
@@ -60,7 +60,7 @@ pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols
 }
 
 /// Lowers an ontology like [`lower_with`], together with additional rules, whose names are in `symbols`. In the
-/// additional rules, `owl:Thing`, `owl:Nothing`, `sameAs` and `differentFrom` have the semantics of OWL (the last two
+/// additional rules, `owl:Thing`, `owl:Nothing`, datatypes, `sameAs` and `differentFrom` have the semantics of OWL (the last two
 /// only under [`Equality::Owl`]). These rules come last in the program.
 pub fn lower_together(
     ontology: &Ontology,
@@ -81,7 +81,14 @@ pub fn lower_together(
     context.add_rules(additional);
     let after_additional = context.rules.len();
     vocabulary::lower(ontology, &mut context);
-    let equality = equality == Equality::Owl && equality::lower(&ontology.axioms, &mut context);
+    let equality = match equality {
+        Equality::Owl => equality::lower(&ontology.axioms, &mut context),
+        Equality::UniqueNames => {
+            equality::forbid(&mut context);
+            false
+        }
+        Equality::UncheckedUniqueNames => false,
+    };
     // The rules of `vocabulary` and `equality` move in front of the additional rules.
     context.rules[before_additional..].rotate_left(after_additional - before_additional);
     let Context { rules, facts, mut warnings, .. } = context;
@@ -100,15 +107,67 @@ pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], symbols: &mut Symbols)
 }
 
 impl Context<'_> {
-    /// Adds rules that come from no document. Under the semantics of OWL, two different names can denote
-    /// the same individual, so a comparison of names becomes the relation `differentFrom`.
+    /// Adds rules that come from no document. Under the semantics of OWL, two different names can denote the same
+    /// individual, so a comparison of names becomes the relation `differentFrom`. A datatype of the ontology becomes a test
+    /// of its values.
     fn add_rules(&mut self, additional: Vec<Rule>) {
         for mut rule in additional {
             for atom in &mut rule.body {
                 atom.replace_different(&mut |left, right| self.different(left, right));
             }
-            self.rules.push(rule);
+            match self.conclusion_of_range(&rule).and_then(|()| self.with_ranges(&rule.body)) {
+                Ok(bodies) => self.rules.extend(bodies.into_iter().map(|body| Rule { body, ..rule.clone() })),
+                Err(reason) => self.warnings.push(Warning::UnusableRule {
+                    ontology: rule.identity.source.to_string(),
+                    position: rule.identity.position,
+                    label: rule.identity.label.as_ref().map(ToString::to_string),
+                    reason: reason.to_owned(),
+                }),
+            }
         }
+    }
+
+    /// Returns an error if a rule concludes that a value is in a datatype of the ontology.
+    fn conclusion_of_range(&self, rule: &Rule) -> Result<(), &'static str> {
+        let is_range = rule.head.iter().any(|atom| self.data_range_of(atom).is_some());
+        if is_range { Err("a data range as a conclusion") } else { Ok(()) }
+    }
+
+    /// Returns the datatype and the value of an atom whose predicate is a datatype of the ontology, negated or not; `None`
+    /// for other atoms.
+    fn data_range_of(&self, atom: &Atom) -> Option<(DataRange, Term)> {
+        let (Atom::Relation { predicate, arguments } | Atom::Not { predicate, arguments }) = atom else {
+            return None;
+        };
+        let ([value], Some(name)) = (arguments.as_slice(), self.symbols.value(*predicate).as_name()) else {
+            return None;
+        };
+        let iri = Iri::from(name);
+        let is_datatype = self.is(EntityKind::Datatype, &iri) || self.definitions.contains_key(&iri);
+        (is_datatype && !self.is(EntityKind::Class, &iri)).then_some((DataRange::Datatype(iri), *value))
+    }
+
+    /// Replaces the datatypes of the ontology in a rule body by tests. Returns alternative bodies, or the reason why the
+    /// rule cannot be used.
+    fn with_ranges(&mut self, body: &[Atom]) -> Result<Vec<Conjunction>, &'static str> {
+        let mut bodies = vec![Vec::new()];
+        for atom in body {
+            let alternatives = match (self.data_range_of(atom), atom) {
+                (Some((range, value)), Atom::Not { .. }) => range::violations(self, &range, &[], value)?,
+                (Some((range, value)), _) => range::condition(self, &range, value)?,
+                (None, Atom::Aggregate { aggregate, result, body }) => {
+                    // Alternatives within an aggregate would count a match several times.
+                    let [body] = self.with_ranges(body)?.try_into().map_err(|_| RANGE_IN_AGGREGATE)?;
+                    vec![vec![Atom::Aggregate { aggregate: *aggregate, result: *result, body }]]
+                }
+                (None, _) => vec![vec![atom.clone()]],
+            };
+            bodies = cross(&bodies, &alternatives);
+            if bodies.len() > range::MAX_RANGE_ALTERNATIVES {
+                return Err("data ranges of too many alternatives");
+            }
+        }
+        Ok(bodies)
     }
 
     /// Removes the rules that the engine rejects, each with a warning. One such rule would make the engine
@@ -138,6 +197,8 @@ impl Context<'_> {
         }
     }
 }
+
+const RANGE_IN_AGGREGATE: &str = "a data range of several alternatives in an aggregate";
 
 fn rejected_rule(error: &Error) -> Option<&RuleIdentity> {
     match error {

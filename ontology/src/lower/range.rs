@@ -14,7 +14,7 @@ use crate::vocab::{owl, rdf, rdfs, xsd};
 /// rejected.
 const MAX_DEFINITION_DEPTH: usize = 16;
 
-const MAX_RANGE_ALTERNATIVES: usize = 1_024;
+pub(crate) const MAX_RANGE_ALTERNATIVES: usize = 1_024;
 
 /// Local names of the XML Schema datatypes whose value spaces the engine implements, each between spaces.
 const DATATYPES: &str = " string normalizedString token language Name NCName NMTOKEN boolean decimal integer \

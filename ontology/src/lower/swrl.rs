@@ -77,7 +77,12 @@ fn renamed(atom: &rules::Atom, name: &mut dyn FnMut(Variable) -> Term) -> rules:
         A::BuiltIn { built_in, arguments } => {
             A::BuiltIn { built_in, arguments: arguments.into_iter().map(term).collect() }
         }
+        A::NotBuiltIn { built_in, arguments } => {
+            A::NotBuiltIn { built_in, arguments: arguments.into_iter().map(term).collect() }
+        }
         A::Aggregate { .. } => atom.clone(),
+        A::NotSame(left, right) => A::NotSame(term(left), term(right)),
+        A::NotDifferent(left, right) => A::NotDifferent(term(left), term(right)),
         A::Same(left, right) => A::Same(term(left), term(right)),
         A::Different(left, right) => A::Different(term(left), term(right)),
     }

@@ -9,19 +9,20 @@ use super::change::holders;
 use super::facts::Facts;
 use super::terms::{self, Term};
 use crate::error::Warning;
+use crate::lower::Equality;
 use crate::owl::{
     AnnotatedAxiom, Argument, Atom, Axiom, Characteristic, DataRange, Iri, Literal,
     ObjectPropertyExpression as Property, Ontology,
 };
 
-/// Checks a model for probable mistakes. `engine` contains the consequences of `ontology`. Returns the
-/// warnings, sorted.
-pub fn check(ontology: &Ontology, engine: &Engine) -> Vec<Warning> {
+/// Checks a model for probable mistakes. `engine` contains the consequences of `ontology` under the given semantics of
+/// names. Returns the warnings, sorted.
+pub fn check(ontology: &Ontology, engine: &Engine, equality: Equality) -> Vec<Warning> {
     let facts = Facts::new(engine);
     let mut warnings = functions(facts);
     warnings.extend(requirements(facts));
     warnings.extend(measurements(facts));
-    warnings.extend(several_values(ontology));
+    warnings.extend(several_values(ontology, equality));
     warnings.extend(statuses(ontology));
     warnings.sort();
     warnings.dedup();
@@ -85,7 +86,7 @@ fn measurements(facts: Facts) -> Vec<Warning> {
 }
 
 /// Reports individuals with several stated values of a functional property. Literals are compared by value.
-fn several_values(ontology: &Ontology) -> Vec<Warning> {
+fn several_values(ontology: &Ontology, equality: Equality) -> Vec<Warning> {
     let functional: BTreeSet<&Iri> = ontology.axioms.iter().filter_map(functional).collect();
     // Axioms are sorted, so that the values of one property of one individual are adjacent.
     let groups = ontology.axioms.chunk_by(|a, b| edge(a).is_some_and(|edge| Some(edge) == self::edge(b)));
@@ -97,12 +98,12 @@ fn several_values(ontology: &Ontology) -> Vec<Warning> {
             subject: subject.to_string(),
             property: property.to_string(),
             values: values.into_iter().collect(),
-            consequence: if individuals {
-                "they are treated as one individual"
-            } else if any_differ(axioms) {
-                "this is a contradiction"
-            } else {
-                "whether these are one value is not decided"
+            consequence: match (individuals, equality) {
+                (true, Equality::Owl) => "they are treated as one individual",
+                (true, Equality::UniqueNames) => "this is a contradiction, because their names are unique",
+                (true, Equality::UncheckedUniqueNames) => "all of them are kept",
+                (false, _) if any_differ(axioms) => "this is a contradiction",
+                (false, _) => "whether these are one value is not decided",
             },
         })
     });

@@ -151,10 +151,12 @@ fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
 }
 
 impl Atom {
-    /// Replaces a comparison of names, also inside an aggregate, by the atom that `replacement` returns.
+    /// Replaces a comparison of names (`differentFrom`), also inside an aggregate, by the atom that `replacement` returns,
+    /// and a negated comparison by the negation of that atom.
     pub fn replace_different(&mut self, replacement: &mut impl FnMut(Term, Term) -> Self) {
         match self {
             Self::Different(left, right) => *self = replacement(*left, *right),
+            Self::NotDifferent(left, right) => *self = replacement(*left, *right).negated(),
             Self::Aggregate { body, .. } => {
                 for atom in body {
                     atom.replace_different(replacement);
@@ -176,6 +178,11 @@ impl Atom {
             Self::BuiltIn { built_in, arguments } => {
                 Self::BuiltIn { built_in: *built_in, arguments: map_terms(arguments) }
             }
+            Self::NotBuiltIn { built_in, arguments } => {
+                Self::NotBuiltIn { built_in: *built_in, arguments: map_terms(arguments) }
+            }
+            Self::NotSame(left, right) => Self::NotSame(term(*left), term(*right)),
+            Self::NotDifferent(left, right) => Self::NotDifferent(term(*left), term(*right)),
             Self::Same(left, right) => Self::Same(term(*left), term(*right)),
             Self::Different(left, right) => Self::Different(term(*left), term(*right)),
             Self::Aggregate { aggregate, result, body } => Self::Aggregate {

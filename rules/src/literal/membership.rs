@@ -13,20 +13,28 @@ enum Kind {
     Rational,
     /// XML content. Two different spellings can denote the same value.
     Xml,
-    /// A fresh value: it differs from other fresh values, and nothing else is known. See [`Literal::fresh`].
+    /// An arbitrary value, see [`Literal::fresh`].
     Fresh,
+    /// One of several arbitrary, but different values, see [`Literal::distinct`].
+    Distinct,
     Unknown,
 }
 
 impl Literal {
-    /// Creates a fresh value, for conclusions about an arbitrary value. It differs from fresh values with other
-    /// numbers; nothing else is known of it.
+    /// Creates a fresh value, for conclusions about an arbitrary value. It can equal any other value, even a fresh value
+    /// with another number.
     pub fn fresh(number: usize) -> Self {
         Self::Opaque { lexical: number.to_string().into(), datatype: FRESH.into() }
     }
 
+    /// Creates a fresh value that is assumed to differ from the distinct fresh values with other numbers. It can equal
+    /// any other value.
+    pub fn distinct(number: usize) -> Self {
+        Self::Opaque { lexical: number.to_string().into(), datatype: DISTINCT.into() }
+    }
+
     pub(crate) fn is_fresh(&self) -> bool {
-        self.kind() == Kind::Fresh
+        matches!(self.kind(), Kind::Fresh | Kind::Distinct)
     }
 
     /// Returns `true` if two literals certainly have different values. Returns `false` if they are equal,
@@ -36,8 +44,10 @@ impl Literal {
             return false;
         }
         match (self.kind(), other.kind()) {
-            (Kind::Unknown, _) | (_, Kind::Unknown) | (Kind::Xml, Kind::Xml) => false,
-            (Kind::Fresh, other) | (other, Kind::Fresh) => other == Kind::Fresh,
+            (Kind::Distinct, Kind::Distinct) => true,
+            (Kind::Unknown | Kind::Fresh | Kind::Distinct, _)
+            | (_, Kind::Unknown | Kind::Fresh | Kind::Distinct)
+            | (Kind::Xml, Kind::Xml) => false,
             _ => true,
         }
     }
@@ -48,6 +58,7 @@ impl Literal {
                 OWL_RATIONAL => Kind::Rational,
                 XML_LITERAL => Kind::Xml,
                 FRESH => Kind::Fresh,
+                DISTINCT => Kind::Distinct,
                 _ => Kind::Unknown,
             },
             _ => Kind::Known,
@@ -74,7 +85,7 @@ impl Literal {
         match (self.kind(), self) {
             (_, Self::Opaque { datatype, .. }) if **datatype == *datatype_iri => Some(true),
             (Kind::Rational, _) if is_real => Some(true),
-            (Kind::Unknown | Kind::Fresh, _) => None,
+            (Kind::Unknown | Kind::Fresh | Kind::Distinct, _) => None,
             (Kind::Rational | Kind::Xml, _) => is_known(datatype_iri).then_some(false),
             (Kind::Known, _) if datatype_iri == XML_LITERAL => Some(false),
             (Kind::Known, _) if is_real => Some(matches!(self, Self::Decimal(_))),
@@ -100,6 +111,7 @@ impl Literal {
 }
 
 const FRESH: &str = "urn:metaplan:fresh";
+const DISTINCT: &str = "urn:metaplan:distinct";
 
 fn is_known(iri: &str) -> bool {
     match (iri.strip_prefix(XSD), iri.strip_prefix(RDF)) {
@@ -160,7 +172,12 @@ mod tests {
             assert_eq!(relation, expected, "{left} {right}");
             assert_eq!(left.differs(&right), right.differs(&left), "{left} {right}");
         }
-        assert!(Literal::fresh(1).differs(&Literal::fresh(2)) && !Literal::fresh(1).differs(&read("1")));
+        let [fresh, distinct] = [Literal::fresh, Literal::distinct];
+        assert!(distinct(1).differs(&distinct(2)));
+        for other in [fresh(2), distinct(2), read("1")] {
+            assert!(!fresh(1).differs(&other) && !other.differs(&fresh(1)), "{other}");
+        }
+        assert!(!distinct(1).differs(&read("1")) && !read("1").differs(&distinct(1)));
     }
 
     #[test]

@@ -62,20 +62,23 @@ fn uses(rule: &Rule, equality: bool, same_as: Symbol, different: Symbol) -> Uses
         }
         Atom::Same(..) => Some((same_as, 2)),
         Atom::Different(..) => Some((different, 2)),
-        Atom::BuiltIn { .. } | Atom::Aggregate { .. } => None,
+        _ => None,
     };
     let mut body = Vec::new();
     for atom in &rule.body {
         match atom {
             Atom::Relation { .. } => body.extend(relation(atom).map(|used| (used, 0))),
             Atom::Not { .. } => body.extend(relation(atom).map(|used| (used, 1))),
+            Atom::NotSame(..) if equality => body.push(((same_as, 2), 1)),
             Atom::Aggregate { body: inner, .. } => {
                 body.extend(inner.iter().filter_map(relation).map(|used| (used, 1)));
+                let is_inequality = |atom: &Atom| matches!(atom, Atom::NotSame(..));
+                body.extend((equality && inner.iter().any(is_inequality)).then_some(((same_as, 2), 1)));
             }
             Atom::Same(..) if equality => body.push(((same_as, 2), 0)),
             // These atoms depend on no relation. Under equality, `differentFrom` is decided only if one term is a
             // literal, which never equals anything else.
-            Atom::Same(..) | Atom::Different(..) | Atom::BuiltIn { .. } => {}
+            _ => {}
         }
     }
     Uses { heads: rule.head.iter().filter_map(relation).collect(), body }

@@ -191,17 +191,22 @@ impl Matcher<'_> {
                 .is_some_and(|fact| !self.facts.contains(&self.names.normal(&fact))),
             Atom::Same(left, right) => find(names, left).is_some() && find(names, left) == find(names, right),
             // Uses all equalities, also later ones, since the difference must hold in the whole model.
-            Atom::Different(left, right) => match (find(self.names, left), find(self.names, right)) {
-                (Some(left), Some(right)) => {
-                    let is_name = |symbol| self.symbols.value(symbol).as_name().is_some();
-                    self.compares_names |= self.equality && is_name(left) && is_name(right);
-                    self.symbols.differ(left, right)
-                }
-                _ => false,
-            },
-            Atom::BuiltIn { built_in, arguments } => self
-                .literals(arguments, values)
-                .is_some_and(|literals| built_in.holds(&literals.iter().collect::<Vec<_>>())),
+            Atom::Different(left, right) => {
+                self.difference(find(self.names, left), find(self.names, right)) == Some(true)
+            }
+            // Like a difference, a missing equality is one that the whole model does not have.
+            Atom::NotSame(left, right) => {
+                let (left, right) = (find(self.names, left), find(self.names, right));
+                left.is_some() && right.is_some() && left != right
+            }
+            Atom::NotDifferent(left, right) => {
+                self.difference(find(self.names, left), find(self.names, right)) == Some(false)
+            }
+            Atom::BuiltIn { built_in, arguments } => self.built_in_holds(*built_in, arguments, values),
+            Atom::NotBuiltIn { built_in, arguments } => {
+                arguments.iter().all(|term| value(*term, values).is_some())
+                    && !self.built_in_holds(*built_in, arguments, values)
+            }
             Atom::Aggregate { result, .. } => {
                 let outcome = self.aggregate(body, position, values);
                 outcome.is_some()
@@ -209,6 +214,20 @@ impl Matcher<'_> {
             }
             Atom::Relation { .. } => false,
         }
+    }
+
+    /// Returns `true` if two symbols certainly differ; `None` if one is missing. Sets [`Matcher::compares_names`] if names
+    /// may be equal.
+    fn difference(&mut self, left: Option<Symbol>, right: Option<Symbol>) -> Option<bool> {
+        let (left, right) = (left?, right?);
+        let is_name = |symbol| self.symbols.value(symbol).as_name().is_some();
+        self.compares_names |= self.equality && is_name(left) && is_name(right);
+        Some(self.symbols.differ(left, right))
+    }
+
+    fn built_in_holds(&self, built_in: BuiltIn, arguments: &[Term], values: &Values) -> bool {
+        let literals = self.literals(arguments, values);
+        literals.is_some_and(|literals| built_in.holds(&literals.iter().collect::<Vec<_>>()))
     }
 
     fn literals(&self, terms: &[Term], values: &Values) -> Option<Vec<Literal>> {
@@ -249,9 +268,11 @@ fn is_ready(body: &[Atom], position: usize, values: &Values) -> bool {
     let is_bound = |term: &Term| value(*term, values).is_some();
     match &body[position] {
         Atom::Relation { .. } => false,
-        Atom::Not { arguments, .. } => arguments.iter().all(is_bound),
+        Atom::Not { arguments, .. } | Atom::NotBuiltIn { arguments, .. } => arguments.iter().all(is_bound),
         Atom::Same(left, right) => is_bound(left) || is_bound(right),
-        Atom::Different(left, right) => is_bound(left) && is_bound(right),
+        Atom::Different(left, right) | Atom::NotSame(left, right) | Atom::NotDifferent(left, right) => {
+            is_bound(left) && is_bound(right)
+        }
         Atom::BuiltIn { built_in, arguments } => {
             built_in.binds(&arguments.iter().map(is_bound).collect::<Vec<_>>())
         }

@@ -219,7 +219,7 @@ impl Replayer<'_> {
             Atom::Relation { predicate, arguments } => instance(*predicate, arguments, values),
             Atom::Same(left, right) => instance(self.same_as, &[*left, *right], values),
             Atom::Different(left, right) => instance(self.different, &[*left, *right], values),
-            Atom::Not { .. } | Atom::BuiltIn { .. } | Atom::Aggregate { .. } => None,
+            _ => None,
         }
     }
 

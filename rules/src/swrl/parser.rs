@@ -273,12 +273,20 @@ impl Parser<'_> {
         self.foreign.extend(ForeignAtom::from_atom(&predicate, &arguments, place, self.symbols));
         if negated {
             self.refuse_in_swrl("negation as failure", place)?;
-            if let (true, [value]) = (is_datatype(&predicate), arguments.as_slice()) {
-                return Ok(self.data_range(BuiltIn::OutsideDataRange, *value, predicate));
-            }
-            let predicate = self.symbols.name(&predicate);
-            return Ok(Atom::Not { predicate, arguments });
         }
+        let atom = self.resolve(&name, predicate, arguments, place)?;
+        Ok(if negated { atom.negated() } else { atom })
+    }
+
+    /// Creates the atom with a predicate and arguments: a built-in, a data range, a comparison of individuals, or a
+    /// relation. `name` is the token of the predicate, and `place` its position.
+    fn resolve(
+        &mut self,
+        name: &Token,
+        predicate: String,
+        mut arguments: Vec<Term>,
+        place: (u32, u32),
+    ) -> Parsed<Atom> {
         if let Some(&built_in) = self.syntax.built_ins.iter().find(|b| b.name() == predicate) {
             return Ok(Atom::BuiltIn { built_in, arguments });
         }
@@ -299,10 +307,10 @@ impl Parser<'_> {
             return Err(Error::ForeignBuiltIn { file, line, column, name: predicate });
         }
         if let (true, [value]) = (is_datatype(&predicate), arguments.as_slice()) {
-            return Ok(self.data_range(BuiltIn::DataRange, *value, predicate));
+            return Ok(self.data_range(*value, predicate));
         }
         let owl = predicate.strip_prefix("http://www.w3.org/2002/07/owl#");
-        let word = match &name {
+        let word = match name {
             Token::Name(None, word) => Some(word.as_str()),
             _ => owl,
         };
@@ -361,11 +369,10 @@ impl Parser<'_> {
         Ok(Atom::Aggregate { aggregate, result, body })
     }
 
-    /// Creates the atom of a datatype used as a predicate: `built_in` tests membership of `value` in the
-    /// datatype.
-    fn data_range(&mut self, built_in: BuiltIn, value: Term, datatype: String) -> Atom {
+    /// Creates the atom of a datatype used as a predicate, which tests membership of `value` in the datatype.
+    fn data_range(&mut self, value: Term, datatype: String) -> Atom {
         let datatype = self.symbols.literal(Literal::Uri(datatype.into()));
-        Atom::BuiltIn { built_in, arguments: vec![value, Term::Constant(datatype)] }
+        Atom::BuiltIn { built_in: BuiltIn::DataRange, arguments: vec![value, Term::Constant(datatype)] }
     }
 
     fn refuse_in_swrl(&self, what: &'static str, (line, column): (u32, u32)) -> Parsed<()> {

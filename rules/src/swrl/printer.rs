@@ -60,13 +60,22 @@ impl Printer<'_> {
             Atom::Aggregate { .. } => String::new(),
             Atom::Relation { predicate, .. } => self.constant(*predicate),
             Atom::Not { predicate, .. } => format!("not {}", self.constant(*predicate)),
-            Atom::BuiltIn { built_in: custom @ BuiltIn::Custom(_), .. } => self.name(custom.name()),
-            Atom::BuiltIn { built_in, .. } => self.name(&format!("{SWRLB}{}", built_in.name())),
+            Atom::BuiltIn { built_in, .. } => self.built_in(*built_in),
+            Atom::NotBuiltIn { built_in, .. } => format!("not {}", self.built_in(*built_in)),
             Atom::Same(..) => "sameAs".into(),
             Atom::Different(..) => "differentFrom".into(),
+            Atom::NotSame(..) => "not sameAs".into(),
+            Atom::NotDifferent(..) => "not differentFrom".into(),
         };
         let arguments: Vec<String> = atom.terms().into_iter().map(|term| self.term(rule, term)).collect();
         format!("{name}({})", arguments.join(", "))
+    }
+
+    fn built_in(&self, built_in: BuiltIn) -> String {
+        match built_in {
+            BuiltIn::Custom(_) => self.name(built_in.name()),
+            _ => self.name(&format!("{SWRLB}{}", built_in.name())),
+        }
     }
 
     fn data_range(&self, atom: &Atom) -> Option<(&'static str, Term, &str)> {

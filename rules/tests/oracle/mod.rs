@@ -278,6 +278,18 @@ fn filter(
             let result = symbols.literal(result);
             bind(arguments[0], result, binding)
         }
+        Atom::NotBuiltIn { built_in, arguments } => {
+            (!holds(*built_in, arguments, &binding, symbols)).then_some(binding)
+        }
+        Atom::NotSame(left, right) => {
+            let names = representatives(symbols, facts);
+            let find =
+                |term| value(term, &binding).map(|symbol| names.get(&symbol).copied().unwrap_or(symbol));
+            (find(*left) != find(*right)).then_some(binding)
+        }
+        Atom::NotDifferent(left, right) => {
+            (value(*left, &binding) == value(*right, &binding)).then_some(binding)
+        }
         Atom::Relation { .. } => panic!("relations come first"),
     }
 }

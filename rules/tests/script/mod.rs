@@ -119,13 +119,19 @@ impl World {
                     let arguments = [left, right].into_iter().chain([left]).take(arity(p)).collect();
                     atoms.push(Atom::Not { predicate: self.predicates[usize::from(p)], arguments });
                 }
-                7 => atoms.push(Atom::BuiltIn {
-                    built_in: if p % 2 == 0 { BuiltIn::LessThan } else { BuiltIn::NotEqual },
-                    arguments: vec![left, right],
-                }),
+                7 => {
+                    let built_in = if p % 2 == 0 { BuiltIn::LessThan } else { BuiltIn::NotEqual };
+                    let test = Atom::BuiltIn { built_in, arguments: vec![left, right] };
+                    atoms.push(if c % 2 == 0 { test } else { test.negated() });
+                }
                 // Under equality, `differentFrom` is a relation of level 1.
                 8 if p % 2 == 0 && self.equality && level == 0 => {}
+                8 if p % 2 == 0 && c % 3 == 0 && (!self.equality || level > 1) => {
+                    atoms.push(Atom::NotDifferent(left, right));
+                }
                 8 if p % 2 == 0 => atoms.push(Atom::Different(left, right)),
+                // Under equality, `sameAs` is a relation of level 0.
+                8 if c % 5 == 0 && (!self.equality || level > 0) => atoms.push(Atom::NotSame(left, right)),
                 8 => {
                     let result = Term::Variable(Variable(u16::from(c % VARIABLES)));
                     bound.insert(result);
@@ -199,7 +205,8 @@ impl World {
     fn is_below(&self, atom: &Atom, level: u8) -> bool {
         match atom {
             Atom::Relation { predicate, .. } => self.level(*predicate) < usize::from(level),
-            Atom::Different(..) => !self.equality || level > 1,
+            Atom::Different(..) | Atom::NotDifferent(..) => !self.equality || level > 1,
+            Atom::NotSame(..) => !self.equality || level > 0,
             _ => true,
         }
     }
@@ -265,6 +272,12 @@ fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<F
                     value(*left, &values).map(find) == value(*right, &values).map(find)
                 }
                 Atom::Different(left, right) => value(*left, &values) != value(*right, &values),
+                Atom::NotBuiltIn { built_in, arguments } =>
+                    !holds(*built_in, arguments, &values, engine.symbols()),
+                Atom::NotSame(left, right) => {
+                    value(*left, &values).map(find) != value(*right, &values).map(find)
+                }
+                Atom::NotDifferent(left, right) => value(*left, &values) == value(*right, &values),
                 Atom::Aggregate { aggregate, result, .. } => {
                     let aggregated = aggregates.next().expect("one for each");
                     let bound: BTreeSet<Term> = values.keys().map(|&variable| variable.into()).collect();

@@ -93,9 +93,9 @@ impl Knowledge {
         let _span = info_span!("knowledge").entered();
         let engine = Engine::with_limits(symbols, program, facts, sources.limits.clone())
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
-        let mistakes = ontology::tomasys::check(&ontology, &engine);
+        let mistakes = ontology::tomasys::check(&ontology, &engine, equality);
         let mistakes = mistakes.iter().map(Message::from_ontology_warning);
-        // Under unique names, several values of a functional property are not inferred to be equal.
+        // In PLANTA's form, several values of a functional object property are accepted.
         warnings.extend(mistakes.filter(|warning| terms.is_none() || warning.code != "O404"));
         let runtime = Runtime::new(engine, Mode::Retract);
         let (sources, entities) = (sources.clone(), ontology.entities.as_slice().into());

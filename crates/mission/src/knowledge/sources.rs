@@ -66,7 +66,7 @@ impl Stated {
     /// All errors of the sources.
     pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Errors> {
         Self::read_with(sources, |ontology| match planta::wanted(ontology, domain) {
-            Some(terms) => (Equality::UniqueNames, Some(Arc::new(terms))),
+            Some(terms) => (Equality::UncheckedUniqueNames, Some(Arc::new(terms))),
             None => (Equality::Owl, None),
         })
     }
