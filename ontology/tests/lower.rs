@@ -131,6 +131,19 @@ fn axioms_forbid() {
         "[ a rdfs:Datatype ; owl:onDatatype xsd:integer ; owl:withRestrictions ( [ xsd:minInclusive 2 ] ) ]";
     for (axioms, consistent, inconsistent) in [
         (":A owl:disjointWith :B . :i a :A . ", ":i a :C .", ":i a :B ."),
+        // NaN is within no bound.
+        (
+            ":d rdfs:range [ a rdfs:Datatype ; owl:onDatatype xsd:double ; \
+             owl:withRestrictions ( [ xsd:maxInclusive \"INF\"^^xsd:double ] ) ] . ",
+            ":i :d \"INF\"^^xsd:double .",
+            ":i :d \"NaN\"^^xsd:double .",
+        ),
+        // A value beyond the limits of the program is in its datatype, and may be in others.
+        (
+            ":d rdfs:range xsd:date . ",
+            ":i :d \"12345678901-01-01\"^^xsd:date .",
+            ":i :d \"12345678901-02-29\"^^xsd:date .",
+        ),
         ("[] a owl:AllDisjointClasses ; owl:members ( :A :B :C ) . :i a :A . ", "", ":i a :C ."),
         (":A rdfs:subClassOf [ a owl:Class ; owl:complementOf :B ] . :i a :A . ", "", ":i a :B ."),
         (":A rdfs:subClassOf owl:Nothing . ", ":i a :B .", ":i a :A ."),
