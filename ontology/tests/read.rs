@@ -463,6 +463,31 @@ fn imports_are_found_on_this_machine() {
 }
 
 #[test]
+fn catalogs_have_a_base_and_may_name_missing_files() {
+    let catalog = |attributes: &str, uri: &str| {
+        format!(
+            "<?xml version=\"1.0\"?><catalog prefer=\"public\" {attributes} \
+             xmlns=\"urn:oasis:names:tc:entity:xmlns:xml:catalog\"><uri name=\"http://e/b\" uri=\"{uri}\"/></catalog>"
+        )
+    };
+    let files = [
+        ("a.ttl", importing("http://e/a", &["http://e/b"])),
+        ("x/y/t.ttl", importing("http://e/b", &[])),
+        ("catalog-v001.xml", catalog("xml:base = 'x/y/'", "t.ttl")),
+    ];
+    let files = files.each_ref().map(|(name, text)| (*name, text.as_str()));
+    let directory = directory(&files);
+    let ontology =
+        read_files(&[directory.path().join("a.ttl")], &ReadOptions::default()).expect("in the catalog");
+    assert_eq!(ontology.sources.len(), 2);
+    std::fs::write(directory.path().join("catalog-v001.xml"), catalog("", "missing.ttl")).expect("written");
+    let errors = read_files(&[directory.path().join("a.ttl")], &ReadOptions::default()).expect_err("missing");
+    let message = errors.to_string();
+    assert!(message.contains("a catalog assigns it to ") && message.contains("missing.ttl"), "{message}");
+    assert!(!message.contains("<uri"), "{message}");
+}
+
+#[test]
 fn our_tomasys_is_found_without_any_file() {
     let text = importing("http://e/root", &["http://metacontrol.org/tomasys"]);
     let ontology = read_text(&text, "root", &ReadOptions::default()).expect("embedded");
