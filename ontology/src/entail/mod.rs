@@ -12,6 +12,7 @@ mod prover;
 mod query;
 mod range;
 mod schema;
+mod tautology;
 
 use rules::{Engine, Error, Fact};
 
@@ -23,6 +24,7 @@ use prover::{Prover, contradiction};
 
 pub use prover::Answer;
 pub use schema::{Schema, SchemaEntity, schema};
+pub use tautology::tautology;
 
 /// A statement and the result of its proof.
 #[derive(Clone, Debug, PartialEq, Eq)]
