@@ -104,6 +104,19 @@ fn forbidden_lexical_forms_are_ill_typed() {
     }
 }
 
+#[test]
+fn values_of_unknown_datatypes_have_no_limits() {
+    for text in [
+        "\"1/3\"^^<http://www.w3.org/2002/07/owl#rational>",
+        "\"x\"^^<urn:d>",
+        "\"a:b\"^^xsd:QName",
+        "\"x\"^^xsd:date",
+        "1",
+    ] {
+        assert!(!literal(text).exceeds_limits(), "{text}");
+    }
+}
+
 /// Such values are valid, but unknown: neither in nor outside of other datatypes.
 #[test]
 fn values_beyond_the_limits_are_undecided() {
@@ -115,7 +128,7 @@ fn values_beyond_the_limits_are_undecided() {
         "\"-P99999999999999999999DT1.5S\"^^xsd:dayTimeDuration",
     ] {
         let value = literal(text);
-        assert!(!value.is_ill_typed(), "{text}");
+        assert!(!value.is_ill_typed() && value.exceeds_limits(), "{text}");
         assert_eq!(value.membership(value.datatype()), Some(true), "{text}");
         assert_eq!(value.membership("http://www.w3.org/2001/XMLSchema#integer"), None, "{text}");
     }

@@ -36,6 +36,16 @@ impl Literal {
     }
 }
 
+impl Literal {
+    /// Returns `true` for a valid moment or duration with a number that exceeds the limits of the program. Nothing
+    /// but its datatype is known.
+    pub fn exceeds_limits(&self) -> bool {
+        let Self::Opaque { datatype, .. } = self else { return false };
+        let local = datatype.strip_prefix(XSD);
+        local.is_some_and(|local| !matches!(parse_xsd("", local), Parsed::Unknown))
+    }
+}
+
 pub(super) enum Parsed {
     Value(Literal),
     IllTyped,
