@@ -4,7 +4,7 @@
 //! `O4xx` for warnings about the TOMASys model.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::read::syntax::Syntax;
 
@@ -74,9 +74,8 @@ pub enum Error {
     },
     /// O103: an import is not found.
     #[error(
-        "{}: error[O103]: cannot find the import <{import}>; name a directory that contains it \
-         (--directory), or a catalog with <uri name=\"{import}\" uri=\"FILE\"/> (--catalog), or continue without \
-         it (--ignore-missing-imports)", place(file, position.as_ref())
+        "{}: error[O103]: cannot find the import <{import}>; {}, or continue without it \
+         (--ignore-missing-imports)", place(file, position.as_ref()), import_remedy(import, target.as_deref())
     )]
     UnresolvedImport {
         /// The importing document.
@@ -85,6 +84,8 @@ pub enum Error {
         position: Option<Position>,
         /// The imported IRI.
         import: String,
+        /// The missing file that a catalog assigns to the IRI.
+        target: Option<PathBuf>,
     },
     /// O104: a catalog is unreadable or malformed.
     #[error("{}: error[O104]: this is not a usable catalog: {reason}", file.display())]
@@ -438,6 +439,20 @@ impl Warning {
             Self::NothingMeasured { .. } => "O405",
             Self::StatusDatatype { .. } => "O406",
         }
+    }
+}
+
+fn import_remedy(import: &str, target: Option<&Path>) -> String {
+    match target {
+        Some(file) => format!(
+            "a catalog assigns it to {}, which is not a file; correct the catalog, or name a directory that contains \
+             the import (--directory)",
+            file.display()
+        ),
+        None => format!(
+            "name a directory that contains it (--directory), or a catalog with <uri name=\"{import}\" \
+             uri=\"FILE\"/> (--catalog)"
+        ),
     }
 }
 

@@ -46,6 +46,10 @@ impl Graph {
         self.triples.get_mut(index).and_then(Option::take)
     }
 
+    pub(crate) fn get(&self, index: usize) -> Option<&Triple> {
+        self.triples.get(index).and_then(Option::as_ref)
+    }
+
     pub(crate) fn get_mut(&mut self, index: usize) -> Option<&mut Triple> {
         self.triples.get_mut(index).and_then(Option::as_mut)
     }

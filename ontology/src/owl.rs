@@ -24,6 +24,10 @@ pub const ANONYMOUS: &str = "urn:metaplan:anonymous:";
 /// document.
 pub(crate) const INVERSE: &str = "urn:metaplan:inverse:";
 
+/// Prefix of the name of an auxiliary datatype that represents a data range within a data range while
+/// horned-owl reads a document.
+pub(crate) const RANGE: &str = "urn:metaplan:range:";
+
 /// A literal as written. [`rules::Literal`] computes its value.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Literal {

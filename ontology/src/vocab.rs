@@ -26,6 +26,7 @@ vocabulary! {
     rdf = "http://www.w3.org/1999/02/22-rdf-syntax-ns#" {
         TYPE = "type", FIRST = "first", REST = "rest", NIL = "nil", LIST = "List", PROPERTY = "Property",
         PLAIN_LITERAL = "PlainLiteral", LANG_STRING = "langString", DIR_LANG_STRING = "dirLangString",
+        XML_LITERAL = "XMLLiteral",
     }
 }
 

@@ -1,8 +1,8 @@
 //! Entailment of each kind of statement, with counterexamples, and the class and property hierarchy.
 
-use ontology::entail::{Answer, annotations, entailments, schema};
+use ontology::entail::{Answer, annotations, entailments, schema, tautology};
 use ontology::{Equality, Ontology, ReadOptions, lower, lower_together, read_text};
-use rules::{Engine, Prefixes, Symbols, parse_rules};
+use rules::{Engine, Fact, Prefixes, Symbols, parse_rules};
 
 const PREFIXES: &str = "@prefix : <http://e/#> .
 @prefix owl: <http://www.w3.org/2002/07/owl#> .
@@ -36,6 +36,30 @@ fn follows(premise: &str, conclusion: &str) -> bool {
         Answer::Open(_) => false,
     };
     results.iter().all(|entailment| answered(&entailment.answer))
+}
+
+#[test]
+fn tautologies_need_no_statement() {
+    let mut symbols = Symbols::new();
+    let names = ["http://e/#a", "http://e/#b"].map(|name| symbols.name(name));
+    let value = symbols.literal(1.into());
+    let [a, b] = names;
+    for (local, arguments, expected) in [
+        ("sameAs", vec![a, a], true),
+        ("sameAs", vec![a, b], false),
+        ("differentFrom", vec![a, a], false),
+        ("Thing", vec![a], true),
+        ("Thing", vec![value], false),
+        ("Nothing", vec![a], false),
+        ("topObjectProperty", vec![a, b], true),
+        ("topObjectProperty", vec![a, value], false),
+        ("topDataProperty", vec![a, value], true),
+        ("bottomDataProperty", vec![a, value], false),
+    ] {
+        let predicate = symbols.name(&format!("http://www.w3.org/2002/07/owl#{local}"));
+        let fact = Fact::new(predicate, arguments);
+        assert_eq!(tautology(&symbols, &fact).is_some(), expected, "{}", fact.display(&symbols));
+    }
 }
 
 #[test]

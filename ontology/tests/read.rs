@@ -287,6 +287,93 @@ fn axioms_with_too_many_pairs_are_reported() {
 }
 
 #[test]
+fn line_ends_of_xml_are_normalised() {
+    let read = |text: &str| {
+        let ontology = read_text(text, "document", &ReadOptions::default());
+        shown(&ontology.unwrap_or_else(|errors| panic!("{errors:?}")))
+    };
+    let rdf = "<rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\" xmlns=\"http://e/#\">\r\n\
+        <rdf:Description rdf:about=\"http://e/#i\"><d>a\r\nb\rc&#xD;</d></rdf:Description>\r</rdf:RDF>";
+    let owl = "<Ontology xmlns=\"http://www.w3.org/2002/07/owl#\" ontologyIRI=\"http://e/\">\r\n\
+        <DataPropertyAssertion><DataProperty IRI=\"http://e/#d\"/><NamedIndividual IRI=\"http://e/#i\"/>\
+        <Literal>a\r\nb\rc&#xD;</Literal></DataPropertyAssertion>\r\n</Ontology>";
+    for text in [rdf, owl] {
+        assert_eq!(read(text), ["DataPropertyAssertion(<d> <i> \"a\nb\nc\r\")"], "{text:?}");
+    }
+}
+
+#[test]
+fn nested_data_ranges_are_read_completely() {
+    // The order in which horned-owl visits blank nodes differs from run to run.
+    for _ in 0..8 {
+        let ontology = turtle(
+            ":C rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :d ; owl:someValuesFrom [ a rdfs:Datatype ; \
+             owl:intersectionOf ( xsd:integer [ a rdfs:Datatype ; owl:intersectionOf ( xsd:decimal [ a \
+             rdfs:Datatype ; owl:unionOf ( xsd:short [ a rdfs:Datatype ; owl:oneOf ( 1 2 ) ] ) ] ) ] ) ] ] .",
+        );
+        let expected = "SubClassOf(<C> DataSomeValuesFrom(<d> DataIntersectionOf(<xsd:integer> \
+            DataIntersectionOf(<xsd:decimal> DataUnionOf(<xsd:short> DataOneOf(\"1\"^^<xsd:integer> \"2\"^^<xsd:integer>))))))";
+        assert_eq!(
+            shown(&ontology),
+            [expected].map(|text| text.replace("xsd:", "http://www.w3.org/2001/XMLSchema#"))
+        );
+        assert_eq!(warnings(&ontology), [""; 0]);
+        assert!(
+            ontology.entities.iter().all(|(_, iri)| !iri.contains("urn:metaplan")),
+            "{:?}",
+            ontology.entities
+        );
+    }
+    // A data range within itself is not a data range, but ends.
+    turtle("_:r a rdfs:Datatype ; owl:unionOf ( xsd:integer _:r ) . :d rdfs:range _:r .");
+}
+
+#[test]
+fn data_ranges_of_datatypes_without_declaration_are_read() {
+    for (datatype, kind) in [
+        ("owl:real", "a rdfs:Datatype ;"),
+        ("owl:rational", ""),
+        ("rdf:langString", ""),
+        ("rdf:XMLLiteral", ""),
+        (":own", "a rdfs:Datatype ;"),
+    ] {
+        let ontology = turtle(&format!(
+            ":C rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :d ; owl:someValuesFrom [ {kind} owl:unionOf ( {datatype} xsd:string ) ] ] ."
+        ));
+        let [axiom] = &shown(&ontology)[..] else { panic!("{datatype}: {:?}", warnings(&ontology)) };
+        assert!(axiom.contains("DataUnionOf("), "{axiom}");
+        assert_eq!(warnings(&ontology), [""; 0], "{datatype}");
+    }
+}
+
+#[test]
+fn inverses_of_inverses_are_equivalences() {
+    let equivalence = |first: &str, second: &str| format!("EquivalentObjectProperties(<{first}> <{second}>)");
+    for (text, expected) in [
+        (":p owl:inverseOf [ owl:inverseOf :q ] .", equivalence("p", "q")),
+        ("[ owl:inverseOf :q ] owl:inverseOf :p .", equivalence("q", "p")),
+        (
+            "[ owl:inverseOf :q ] owl:inverseOf [ a owl:ObjectProperty ; owl:inverseOf :p ] .",
+            "InverseObjectProperties(<q> <p>)".to_owned(),
+        ),
+        (":p owl:inverseOf :q .", "InverseObjectProperties(<p> <q>)".to_owned()),
+    ] {
+        let ontology = turtle(text);
+        assert_eq!(shown(&ontology), [expected], "{text}");
+        assert_eq!(warnings(&ontology), [""; 0], "{text}");
+    }
+    let text = "Prefix(:=<http://e/#>)\nOntology(<http://e/>\nDeclaration(ObjectProperty(:p))\n\
+        InverseObjectProperties(:p ObjectInverseOf(:q))\n)";
+    let ontology = read_text(text, "text", &ReadOptions::default()).unwrap_or_else(|e| panic!("{e:?}"));
+    assert_eq!(shown(&ontology), [equivalence("p", "q")]);
+    let text = text.replace("ObjectInverseOf(:q)", "\"q\"");
+    let errors = read_text(&text, "text", &ReadOptions::default()).expect_err("not in the grammar");
+    let message = errors.to_string();
+    assert!(message.contains("text:4:") && message.contains("expected"), "{message}");
+    assert!(!message.contains("-->"), "{message}");
+}
+
+#[test]
 fn a_missing_file_is_an_error() {
     let errors =
         read_files(&[Path::new("/nonexistent/kb.owl")], &ReadOptions::default()).expect_err("missing");
@@ -373,6 +460,31 @@ fn imports_are_found_on_this_machine() {
             );
         }
     }
+}
+
+#[test]
+fn catalogs_have_a_base_and_may_name_missing_files() {
+    let catalog = |attributes: &str, uri: &str| {
+        format!(
+            "<?xml version=\"1.0\"?><catalog prefer=\"public\" {attributes} \
+             xmlns=\"urn:oasis:names:tc:entity:xmlns:xml:catalog\"><uri name=\"http://e/b\" uri=\"{uri}\"/></catalog>"
+        )
+    };
+    let files = [
+        ("a.ttl", importing("http://e/a", &["http://e/b"])),
+        ("x/y/t.ttl", importing("http://e/b", &[])),
+        ("catalog-v001.xml", catalog("xml:base = 'x/y/'", "t.ttl")),
+    ];
+    let files = files.each_ref().map(|(name, text)| (*name, text.as_str()));
+    let directory = directory(&files);
+    let ontology =
+        read_files(&[directory.path().join("a.ttl")], &ReadOptions::default()).expect("in the catalog");
+    assert_eq!(ontology.sources.len(), 2);
+    std::fs::write(directory.path().join("catalog-v001.xml"), catalog("", "missing.ttl")).expect("written");
+    let errors = read_files(&[directory.path().join("a.ttl")], &ReadOptions::default()).expect_err("missing");
+    let message = errors.to_string();
+    assert!(message.contains("a catalog assigns it to ") && message.contains("missing.ttl"), "{message}");
+    assert!(!message.contains("<uri"), "{message}");
 }
 
 #[test]

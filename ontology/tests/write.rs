@@ -115,6 +115,88 @@ fn annotations_of_annotations_are_kept() {
     }
 }
 
+fn written(text: &str, syntax: OutputSyntax) -> Result<String, String> {
+    let directory = tempfile::tempdir().expect("a folder");
+    let file = directory.path().join("text.ttl");
+    let head = "@prefix : <http://e.org/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
+        @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix swrl: <http://www.w3.org/2003/11/swrl#> . \
+        @prefix xsd: <http://www.w3.org/2001/XMLSchema#> . <http://e.org/> a owl:Ontology . :C a owl:Class . \
+        :d a owl:DatatypeProperty . :x a swrl:Variable .\n";
+    std::fs::write(&file, format!("{head}{text}")).expect("written");
+    convert_files(&[&file], &ReadOptions::default(), syntax)
+        .map(|(text, _)| text)
+        .map_err(|errors| errors.to_string())
+}
+
+#[test]
+fn empty_bodies_and_heads_survive_conversion() {
+    let atom = "( [ a swrl:ClassAtom ; swrl:classPredicate :C ; swrl:argument1 :x ] )";
+    let text = format!(
+        "[ a swrl:Imp ; swrl:body {atom} ; swrl:head () ] . \
+        [ a swrl:Imp ; swrl:body () ; swrl:head ( [ a swrl:ClassAtom ; swrl:classPredicate :C ; swrl:argument1 :i ] ) ] ."
+    );
+    for syntax in ALL {
+        let text = written(&text, syntax).expect("writable");
+        assert!(!text.contains("urn:metaplan"), "{text}");
+        let again = read_text(&text, "again", &ReadOptions::default()).expect("readable");
+        let rules: BTreeSet<String> = again.rules.iter().map(ToString::to_string).collect();
+        let expected = [" -> <http://e.org/#C>(<http://e.org/#i>)", "<http://e.org/#C>(?x) -> "];
+        assert!(rules.iter().map(String::as_str).eq(expected), "{syntax:?}: {rules:?}");
+        // Documents that were written are converted without a trace of the internal form of the rules.
+        let directory = tempfile::tempdir().expect("a folder");
+        std::fs::write(directory.path().join("again"), &text).expect("written");
+        let files = [directory.path().join("again")];
+        let (turtle, _) =
+            convert_files(&files, &ReadOptions::default(), OutputSyntax::Turtle).expect("writable");
+        assert!(!turtle.contains("urn:metaplan"), "{turtle}");
+    }
+}
+
+#[test]
+fn nested_data_ranges_survive_conversion() {
+    let text = ":d rdfs:range [ a rdfs:Datatype ; owl:unionOf ( xsd:integer [ a rdfs:Datatype ; owl:intersectionOf ( \
+        xsd:string [ a rdfs:Datatype ; owl:datatypeComplementOf [ a rdfs:Datatype ; owl:oneOf ( \"a\" ) ] ] ) ] ) ] .";
+    for syntax in ALL {
+        let text = written(text, syntax).expect("writable");
+        assert!(!text.contains("urn:metaplan"), "{text}");
+        let again = read_text(&text, "again", &ReadOptions::default()).expect("readable");
+        let axioms: Vec<String> = again.axioms.iter().map(|annotated| annotated.axiom.to_string()).collect();
+        let expected = "DataPropertyRange(<http://e.org/#d> \
+            DataUnionOf(<http://www.w3.org/2001/XMLSchema#integer> \
+            DataIntersectionOf(<http://www.w3.org/2001/XMLSchema#string> DataComplementOf(DataOneOf(\"a\")))))";
+        assert_eq!(axioms, [expected], "{syntax:?}");
+    }
+}
+
+#[test]
+fn xml_that_is_not_well_formed_is_not_written() {
+    for iri in ["http://x/#1", "http://x/p/", "urn:uuid:12-34"] {
+        let error = written(&format!(":i <{iri}> 1 ."), OutputSyntax::RdfXml).expect_err(iri);
+        assert!(error.contains("O111") && error.contains(iri) && error.contains("Turtle"), "{error}");
+        let error = written(&format!(":i a <{iri}> ."), OutputSyntax::RdfXml).expect_err(iri);
+        assert!(error.contains(&format!("class <{iri}>")), "{error}");
+        assert!(written(&format!(":i a :C , <{iri}> ."), OutputSyntax::RdfXml).is_ok(), "{iri}");
+        assert!(written(&format!(":i <{iri}> 1 ."), OutputSyntax::Turtle).is_ok(), "{iri}");
+    }
+    for (text, code) in [("\\u0001", "U+0001"), ("\\uFFFE", "U+FFFE")] {
+        for syntax in [OutputSyntax::RdfXml, OutputSyntax::OwlXml] {
+            let error = written(&format!(":i :d \"a{text}\" ."), syntax).expect_err(text);
+            assert!(error.contains("O111") && error.contains(code), "{error}");
+        }
+    }
+}
+
+#[test]
+fn carriage_returns_survive_conversion() {
+    for syntax in ALL {
+        let text = written(":i :d \"a\\r\\nb\\rc\" .", syntax).expect("writable");
+        let again = read_text(&text, "again", &ReadOptions::default()).expect("readable");
+        let axioms: Vec<String> = again.axioms.iter().map(|annotated| annotated.axiom.to_string()).collect();
+        let value = axioms[0].replace('\r', "\\r").replace('\n', "\\n");
+        assert!(value.contains("a\\r\\nb\\rc"), "{syntax:?}: {text}");
+    }
+}
+
 /// Axioms about annotation properties are written as axioms. An n-ary axiom about a single individual has no
 /// form and is omitted.
 #[test]

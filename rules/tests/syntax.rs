@@ -117,6 +117,10 @@ fn errors_have_codes_and_positions() {
         ],
     );
     check(
+        "p(?x) -> q(\"a\\u00A0b) . c\") . p(?x) -> r(\"\\d\") .",
+        &["test:1:12: R101 unknown escape in a string", "test:1:42: R101 unknown escape in a string"],
+    );
+    check(
         "p(?x) -> q(\"open",
         &[
             "test:1:12: R101 the closing `\"` of a string is missing",

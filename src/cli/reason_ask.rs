@@ -10,7 +10,7 @@ use crate::knowledge::Knowledge;
 use crate::message::Message;
 use crate::visible::visible_json;
 use clap::Args;
-use ontology::entail::{Answer, Schema, annotations, entailments, schema};
+use ontology::entail::{Answer, Schema, annotations, entailments, schema, tautology};
 use ontology::vocab::{local_name, rdf};
 use rules::{Atom, Engine, Fact, Literal, Symbol, Term, Value};
 
@@ -121,13 +121,16 @@ fn why(engine: &Engine, fact: &Fact) -> (bool, String) {
     let text_of_fact = fact.display(engine.symbols());
     match engine.why(fact) {
         Some(derivation) => (true, derivation.display(engine.symbols()).to_string()),
-        None => (false, format!("{text_of_fact} does not hold; `--why-not` says what is missing\n")),
+        None => match tautology(engine.symbols(), fact) {
+            Some(reason) => (true, format!("{text_of_fact} holds: {reason}\n")),
+            None => (false, format!("{text_of_fact} does not hold; `--why-not` says what is missing\n")),
+        },
     }
 }
 
 fn why_not(engine: &Engine, fact: &Fact) -> (bool, String) {
     let text_of_fact = fact.display(engine.symbols());
-    if engine.holds(fact) {
+    if engine.holds(fact) || tautology(engine.symbols(), fact).is_some() {
         return (false, format!("{text_of_fact} holds; `--why` says why\n"));
     }
     let mut text = format!("{text_of_fact} does not hold\n");

@@ -14,6 +14,7 @@ mod prover;
 mod query;
 mod range;
 mod schema;
+mod tautology;
 
 use rules::{Engine, Error, Fact};
 
@@ -25,6 +26,7 @@ use prover::Prover;
 
 pub use prover::Answer;
 pub use schema::{Schema, SchemaEntity, schema};
+pub use tautology::tautology;
 
 /// A statement and the result of its proof.
 #[derive(Clone, Debug, PartialEq, Eq)]

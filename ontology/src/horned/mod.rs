@@ -19,6 +19,7 @@ use std::sync::Arc;
 use horned_owl::io::ParserConfiguration;
 use horned_owl::io::rdf::reader::{ConcreteRcRDFOntology, IncompleteParse, OntologyParser, Term};
 use horned_owl::model::{self as ho, Component, RcAnnotatedComponent, RcStr};
+use rustc_hash::FxHashMap as HashMap;
 
 use crate::contents::Parts;
 use crate::error::Warning;
@@ -26,7 +27,7 @@ use crate::names::Names;
 use crate::normalize::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
 use crate::owl::{
     ANONYMOUS, AnnotatedAxiom, Annotation, AnnotationValue, Argument, Atom, Axiom, Bound, Characteristic,
-    ClassExpression, DataRange, EntityKind, INVERSE, Iri, Literal, ObjectPropertyExpression, Rule,
+    ClassExpression, DataRange, EntityKind, INVERSE, Iri, Literal, ObjectPropertyExpression, RANGE, Rule,
 };
 use crate::vocab::{rdfs, swrla};
 
@@ -67,8 +68,23 @@ fn build_here(
         parser.parse()
     };
     let (ontology, incomplete) = reading().map_err(|error| plain_text(&error.to_string()))?;
-    let mut builder = Builder { ontology: about.into(), names, parts: plain, rules: Vec::new() };
+    let mut builder = Builder {
+        ontology: about.into(),
+        names,
+        parts: plain,
+        rules: Vec::new(),
+        ranges: HashMap::default(),
+    };
+    let mut components = Vec::new();
     for annotated in ontology {
+        match annotated.component {
+            Component::DatatypeDefinition(definition) if definition.kind.0.starts_with(RANGE) => {
+                builder.ranges.insert(String::from(&*definition.kind.0), definition.range);
+            }
+            _ => components.push(annotated),
+        }
+    }
+    for annotated in components {
         builder.component(annotated.component, annotated.ann);
     }
     let unread = builder.leftovers(&incomplete);
@@ -99,6 +115,8 @@ struct Builder {
     parts: Parts,
     /// Rules, each with its index in `origins` of [`build`].
     rules: Vec<(usize, Rule)>,
+    /// Data ranges within data ranges, by the names that `normalize::forms` gives them.
+    ranges: HashMap<String, ho::DataRange<RcStr>>,
 }
 
 impl Builder {
@@ -285,7 +303,15 @@ impl Builder {
 
     fn range(&mut self, range: &ho::DataRange<RcStr>) -> DataRange {
         match range {
-            ho::DataRange::Datatype(iri) => DataRange::Datatype(self.iri(iri)),
+            // A definition is unavailable within itself, so that a cyclic definition ends here.
+            ho::DataRange::Datatype(iri) => match self.ranges.remove_entry::<str>(iri) {
+                Some((name, definition)) => {
+                    let range = self.range(&definition);
+                    self.ranges.insert(name, definition);
+                    range
+                }
+                None => DataRange::Datatype(self.iri(iri)),
+            },
             ho::DataRange::DataIntersectionOf(ranges) => DataRange::IntersectionOf(self.ranges(ranges)),
             ho::DataRange::DataUnionOf(ranges) => DataRange::UnionOf(self.ranges(ranges)),
             ho::DataRange::DataComplementOf(range) => DataRange::ComplementOf(Box::new(self.range(range))),
@@ -462,6 +488,7 @@ fn entity(component: &Component<RcStr>) -> Option<(EntityKind, &str)> {
         Component::DeclareAnnotationProperty(d) if !d.0.starts_with(ORIGIN) => {
             (EntityKind::AnnotationProperty, &*d.0)
         }
+        Component::DeclareDatatype(d) if d.0.starts_with(RANGE) => return None,
         Component::DeclareDatatype(d) => (EntityKind::Datatype, &*d.0),
         Component::DeclareNamedIndividual(d) => (EntityKind::NamedIndividual, &*d.0),
         _ => return None,

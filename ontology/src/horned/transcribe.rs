@@ -8,6 +8,7 @@ use horned_owl::ontology::component_mapped::ComponentMappedOntology;
 use horned_owl::ontology::set::SetOntology;
 
 use super::stack::with_stack;
+use crate::normalize::TRUE;
 use crate::read::syntax::Syntax;
 
 #[derive(Debug)]
@@ -24,7 +25,11 @@ fn message(error: &HornedError) -> String {
             "an element ends here that lacks a part, or has one that OWL does not know".to_owned()
         }
         HornedError::ValidityError(message, _) => message.clone(),
-        HornedError::ParserError(error, _) => error.to_string(),
+        // The message of the functional-style parser quotes the line; its last line has the reason.
+        HornedError::ParserError(error, _) => {
+            let text = error.to_string();
+            text.rsplit_once("\n  = ").map_or(text.clone(), |(_, reason)| reason.to_owned())
+        }
         _ => error.to_string(),
     }
 }
@@ -49,11 +54,30 @@ pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> 
             Syntax::OwlXml => owx::reader::read(&mut text, configuration)?.0,
             _ => ofn::reader::read(&mut text, configuration)?.0,
         };
+        let ontology: SetOntology<RcStr> =
+            ontology.into_iter().map(|component| without_empty_part(component, &build)).collect();
         let ontology = ComponentMappedOntology::<RcStr, RcAnnotatedComponent>::from(ontology);
         rdf::writer::write_to_rdf_format(Vec::new(), &ontology, "nt")
     };
     let panicked = |_| Fault { offset: 0, message: format!("the {syntax} reader failed on this document") };
     with_stack(|| transcription().map_err(fault)).map_err(panicked)?
+}
+
+/// Adds the atom `sameAs(TRUE, TRUE)` to an empty body or head of a rule, because the RDF writer panics on an
+/// empty list. `crate::read` removes the atom.
+fn without_empty_part(
+    mut component: ho::AnnotatedComponent<RcStr>,
+    build: &ho::Build<RcStr>,
+) -> ho::AnnotatedComponent<RcStr> {
+    if let ho::Component::Rule(rule) = &mut component.component {
+        let truth = || ho::IArgument::Individual(build.named_individual(TRUE).into());
+        for part in [&mut rule.body, &mut rule.head] {
+            if part.is_empty() {
+                part.push(ho::Atom::SameIndividualAtom(truth(), truth()));
+            }
+        }
+    }
+    component
 }
 
 pub(crate) fn owl_xml(text: &[u8]) -> Result<String, String> {

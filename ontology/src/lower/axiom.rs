@@ -80,6 +80,9 @@ fn assertion(context: &mut Context, axiom: &Axiom) {
         }
         Axiom::DataPropertyAssertion(property, from, to) => {
             let (property, from, to) = (context.iri(property), context.iri(from), context.literal(to));
+            if context.symbols.value(to).as_literal().is_some_and(rules::Literal::exceeds_limits) {
+                context.outside(axiom, true, "a value beyond the limits of the program");
+            }
             context.state(property, [from, to]);
         }
         Axiom::SameIndividual(individuals) => {

@@ -86,6 +86,14 @@ impl RangeLowering<'_, '_> {
                     outside.extend(cross(&within, &[vec![breaks_facet]]));
                     within = cross(&within, &[vec![self.facet(facet, bound, true)?]]);
                 }
+                let is_float = [xsd::FLOAT, xsd::DOUBLE].contains(&&**iri);
+                let is_nan = |(_, bound): &(_, crate::owl::Literal)| &*bound.lexical == "NaN";
+                if is_float && !inside && !facets.is_empty() && !facets.iter().any(is_nan) {
+                    // NaN is neither within nor beyond a bound, because it is incomparable.
+                    let (lexical, datatype) = ("NaN".into(), Some(iri.clone()));
+                    let nan = crate::owl::Literal { lexical, datatype, language: None };
+                    outside.extend(self.tests(&DataRange::OneOf(vec![nan]), true, depth)?);
+                }
                 Ok(if inside { within } else { outside })
             }
         }

@@ -7,6 +7,10 @@
 //! - Axioms and annotations that are nodes with an IRI get a blank node instead.
 //! - Inverse properties in qualified cardinality restrictions get a name, which `crate::horned` translates
 //!   back.
+//! - Axioms that state the inverse of an anonymous inverse property state the equivalence of named properties.
+//! - Data ranges within the list of a union or intersection get a name with a definition, which
+//!   `crate::horned` replaces by the data range. horned-owl discards such a list if it visits the list before
+//!   a blank node in it, and the order of its visits differs from run to run.
 //! - Headers of ontologies without an IRI are removed.
 //!
 //! [1] OWL 2 Web Ontology Language, Mapping to RDF Graphs, W3C 2012.
@@ -15,7 +19,8 @@ use oxrdf::{NamedNode, NamedOrBlankNode, Term};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::graph::{Graph, is_type, subject_of};
-use crate::owl::INVERSE;
+use crate::normalize::depth::MAX_NESTING;
+use crate::owl::{INVERSE, RANGE};
 use crate::vocab::{owl, rdf, rdfs, xsd};
 
 const CONNECTIVES: [&str; 5] =
@@ -43,6 +48,8 @@ pub(crate) fn rewrite(graph: &mut Graph) {
     remove_axiom_iris(graph);
     definitions(graph);
     correct_types(graph);
+    name_ranges(graph);
+    replace_double_inverses(graph);
     name_inverses(graph);
 }
 
@@ -135,7 +142,9 @@ fn correct_types(graph: &mut Graph) {
             owl::ON_DATATYPE | owl::DATATYPE_COMPLEMENT_OF => rdfs::DATATYPE,
             owl::COMPLEMENT_OF => owl::CLASS,
             owl::ONE_OF | owl::UNION_OF | owl::INTERSECTION_OF => {
-                if has_values(graph, &triple.object, &datatypes) { rdfs::DATATYPE } else { owl::CLASS }
+                let is_datatype = datatypes.contains(&Term::from(triple.subject.clone()))
+                    || has_values(graph, &triple.object, &datatypes);
+                if is_datatype { rdfs::DATATYPE } else { owl::CLASS }
             }
             _ => continue,
         };
@@ -163,25 +172,126 @@ fn correct_types(graph: &mut Graph) {
     }
 }
 
-/// Returns `true` if the first member of a list is a literal or a data range.
+/// Datatypes outside the namespace of XML Schema that need no declaration.
+const BUILT_IN_DATATYPES: [&str; 6] =
+    [rdfs::LITERAL, rdf::PLAIN_LITERAL, rdf::LANG_STRING, rdf::XML_LITERAL, owl::REAL, owl::RATIONAL];
+
+/// Returns `true` if the first member of a list is a literal or a data range. The first member of a data range
+/// without a type decides.
 fn has_values(graph: &Graph, list: &Term, datatypes: &FxHashSet<Term>) -> bool {
-    let first = subject_of(list).and_then(|node| graph.objects(&node, rdf::FIRST).next());
-    match first {
-        Some(Term::Literal(_)) => true,
-        Some(Term::NamedNode(iri)) => {
-            iri.as_str().starts_with(xsd::NS)
-                || [rdfs::LITERAL, rdf::PLAIN_LITERAL].contains(&iri.as_str())
-                || datatypes.contains(&Term::from(iri.clone()))
+    let mut list = list.clone();
+    // The limit also ends cycles.
+    for _ in 0..MAX_NESTING {
+        let first = subject_of(&list).and_then(|node| graph.objects(&node, rdf::FIRST).next());
+        let node = match first {
+            Some(Term::Literal(_)) => return true,
+            Some(Term::NamedNode(iri)) => {
+                return iri.as_str().starts_with(xsd::NS)
+                    || BUILT_IN_DATATYPES.contains(&iri.as_str())
+                    || datatypes.contains(&Term::from(iri.clone()));
+            }
+            Some(node @ Term::BlankNode(_)) if datatypes.contains(node) => return true,
+            Some(Term::BlankNode(blank)) => NamedOrBlankNode::from(blank.clone()),
+            None => return false,
+        };
+        let is_data = graph.of(&node).any(|(_, triple)| {
+            [owl::ON_DATATYPE, owl::DATATYPE_COMPLEMENT_OF].contains(&triple.predicate.as_str())
+                || is_type(triple, owl::DATA_RANGE)
+        });
+        if is_data {
+            return true;
         }
-        Some(node @ Term::BlankNode(blank)) => {
-            let data = [owl::ON_DATATYPE, owl::DATATYPE_COMPLEMENT_OF];
-            let blank = NamedOrBlankNode::from(blank.clone());
-            datatypes.contains(node)
-                || graph.of(&blank).any(|(_, triple)| {
-                    data.contains(&triple.predicate.as_str()) || is_type(triple, owl::DATA_RANGE)
-                })
+        let lists = [owl::ONE_OF, owl::UNION_OF, owl::INTERSECTION_OF];
+        let nested = graph.of(&node).find(|(_, triple)| lists.contains(&triple.predicate.as_str()));
+        match nested {
+            Some((_, triple)) => list = triple.object.clone(),
+            None => return false,
         }
-        None => false,
+    }
+    false
+}
+
+/// Names the blank nodes in the lists of data unions and data intersections, and defines the names as the
+/// nodes.
+fn name_ranges(graph: &mut Graph) {
+    let mut cells: Vec<usize> = Vec::new();
+    for (_, node) in graph.instances(rdfs::DATATYPE) {
+        let lists = [owl::UNION_OF, owl::INTERSECTION_OF].map(|predicate| graph.objects(&node, predicate));
+        for list in lists.into_iter().flatten().filter_map(|head| graph.list(head).ok()) {
+            cells.extend(list.spine.into_iter().filter(|&index| {
+                let is_nested = |triple: &oxrdf::Triple| {
+                    triple.predicate.as_str() == rdf::FIRST && matches!(triple.object, Term::BlankNode(_))
+                };
+                graph.get(index).is_some_and(is_nested)
+            }));
+        }
+    }
+    // Two ranges may share a list.
+    cells.sort_unstable();
+    cells.dedup();
+    for (number, index) in cells.into_iter().enumerate() {
+        let name = NamedNode::new_unchecked(format!("{RANGE}{number}"));
+        let Some(triple) = graph.get_mut(index) else { continue };
+        let range = std::mem::replace(&mut triple.object, name.clone().into());
+        let name = NamedOrBlankNode::from(name);
+        state(graph, &name, rdf::TYPE, rdfs::DATATYPE);
+        graph.state(&name, owl::EQUIVALENT_CLASS, range);
+    }
+}
+
+/// Replaces `p owl:inverseOf [ owl:inverseOf q ]` and `[ owl:inverseOf q ] owl:inverseOf p` by `p
+/// owl:equivalentProperty q`, and `[ owl:inverseOf q ] owl:inverseOf [ owl:inverseOf p ]` by `q owl:inverseOf p`.
+fn replace_double_inverses(graph: &mut Graph) {
+    let inverses = |graph: &Graph, node: &NamedOrBlankNode| -> Vec<(usize, Term)> {
+        let triples = graph.of(node).filter(|(_, triple)| triple.predicate.as_str() == owl::INVERSE_OF);
+        triples.map(|(index, triple)| (index, triple.object.clone())).collect()
+    };
+    // The named property whose inverse a blank node is.
+    let property_of = |graph: &Graph, node: &Term| {
+        let Term::BlankNode(node) = node else { return None };
+        let mut objects = inverses(graph, &node.clone().into()).into_iter().map(|(_, object)| object);
+        objects.find(|object| matches!(object, Term::NamedNode(_)))
+    };
+    let mut axioms = Vec::new();
+    for (index, triple) in graph.iter().filter(|(_, triple)| triple.predicate.as_str() == owl::INVERSE_OF) {
+        let (subject, object) = (Term::from(triple.subject.clone()), &triple.object);
+        let axiom = match (property_of(graph, &subject), property_of(graph, object)) {
+            (None, Some(property)) => (subject, owl::EQUIVALENT_PROPERTY, property),
+            // The first triple about a blank node defines it.
+            (Some(property), None) if property != *object => {
+                (property, owl::EQUIVALENT_PROPERTY, object.clone())
+            }
+            (Some(property), Some(other)) => (property, owl::INVERSE_OF, other),
+            _ => continue,
+        };
+        axioms.push((index, axiom));
+    }
+    let mut nodes = Vec::new();
+    for (index, (subject, predicate, object)) in axioms {
+        let Some(subject) = subject_of(&subject) else { continue };
+        if let Some(triple) = graph.take(index) {
+            nodes.extend([Term::from(triple.subject), triple.object]);
+        }
+        for property in [Some(subject.clone()), subject_of(&object)].into_iter().flatten() {
+            state(graph, &property, rdf::TYPE, owl::OBJECT_PROPERTY);
+        }
+        graph.state(&subject, predicate, object);
+    }
+    remove_unreferenced(graph, nodes);
+}
+
+/// Removes the triples about blank nodes without a reference. horned-owl would report an inverse as left over.
+fn remove_unreferenced(graph: &mut Graph, nodes: Vec<Term>) {
+    if nodes.is_empty() {
+        return;
+    }
+    let references = graph.references();
+    for node in nodes {
+        if let Term::BlankNode(node) = node
+            && !references.contains_key(&node)
+        {
+            take_all(graph, &node.into());
+        }
     }
 }
 
@@ -218,13 +328,5 @@ fn name_inverses(graph: &mut Graph) {
             state(graph, &name.into(), rdf::TYPE, owl::OBJECT_PROPERTY);
         }
     }
-    // An inverse without a remaining reference would be left over by horned-owl.
-    let references = graph.references();
-    for node in renamed {
-        if let Term::BlankNode(node) = node
-            && !references.contains_key(&node)
-        {
-            take_all(graph, &node.into());
-        }
-    }
+    remove_unreferenced(graph, renamed);
 }

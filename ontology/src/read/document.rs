@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 
 use oxrdf::{BlankNode, NamedOrBlankNode, Term, Triple};
-use rustc_hash::FxHashMap as HashMap;
+use rustc_hash::{FxHashMap as HashMap, FxHashSet};
 
 use super::message::shortened;
 use super::structural::Structural;
@@ -16,8 +16,9 @@ use super::{encoding, entities, foreign};
 use crate::error::{Error, Errors, Position};
 use crate::graph::iri_of;
 use crate::names::{Compact, Names, Object};
+use crate::normalize::TRUE;
 use crate::triples::Document;
-use crate::vocab::{owl, rdf};
+use crate::vocab::{owl, rdf, swrl};
 
 /// Number of syntax errors in a Turtle document after which parsing stops. Other parsers stop at the first
 /// error.
@@ -49,6 +50,10 @@ pub(crate) fn parse(
     names: &mut Names,
 ) -> Result<Document, Errors> {
     let syntax = Syntax::detect(text);
+    let text = match syntax {
+        Syntax::RdfXml | Syntax::OwlXml => &*with_line_feeds(text),
+        Syntax::Turtle | Syntax::Functional => text,
+    };
     let mut sink = Sink { names, prefix, blanks: HashMap::default(), triples: Vec::new() };
     match syntax {
         Syntax::Turtle if parse_ntriples(text, &mut sink) => {}
@@ -63,7 +68,8 @@ pub(crate) fn parse(
             parse_turtle(&ntriples, name, base, &mut sink)?;
         }
     }
-    let Sink { names, triples, .. } = sink;
+    let Sink { names, mut triples, .. } = sink;
+    remove_truth(&mut triples, names);
     let [rdf_type, ontology, imports, version] =
         [rdf::TYPE, owl::ONTOLOGY, owl::IMPORTS, owl::VERSION_IRI].map(|iri| names.number(iri));
     let is_header = |triple: &&Compact| {
@@ -86,6 +92,49 @@ pub(crate) fn parse(
     let position = |iri: &str| offset_of(iri).map(|offset| Position::of_offset(name, text, offset));
     let imports = objects(imports).map(|iri| (iri.to_string(), position(&iri))).collect();
     Ok(Document { name: name.to_owned(), syntax, iri: header, version, imports, triples })
+}
+
+/// Replaces each line end of an XML document (CR LF, or CR alone) by LF, as XML requires before parsing [1]. The
+/// numbers of lines do not change.
+///
+/// [1] Extensible Markup Language (XML) 1.0, fifth edition, W3C 2008, section 2.11.
+fn with_line_feeds(text: &[u8]) -> Cow<'_, [u8]> {
+    if memchr::memchr(b'\r', text).is_none() {
+        return text.into();
+    }
+    let mut result = Vec::with_capacity(text.len());
+    for (index, &byte) in text.iter().enumerate() {
+        match byte {
+            b'\r' if text.get(index + 1) == Some(&b'\n') => {}
+            b'\r' => result.push(b'\n'),
+            _ => result.push(byte),
+        }
+    }
+    result.into()
+}
+
+/// Removes the atoms `sameAs(TRUE, TRUE)` that `crate::horned` adds to an empty body or head of a rule, so that
+/// the list is empty again.
+fn remove_truth(triples: &mut Vec<Compact>, names: &mut Names) {
+    let Some(truth) = names.find(TRUE) else { return };
+    let [argument, first, nil] = [swrl::ARGUMENT1, rdf::FIRST, rdf::NIL].map(|iri| names.number(iri));
+    let subjects = |triples: &[Compact], predicate: u32, objects: &FxHashSet<u32>| -> FxHashSet<u32> {
+        let matches = |triple: &&Compact| {
+            triple.predicate == predicate
+                && matches!(triple.object, Object::Node(node) if objects.contains(&node))
+        };
+        triples.iter().filter(matches).map(|triple| triple.subject).collect()
+    };
+    let atoms = subjects(triples, argument, &FxHashSet::from_iter([truth]));
+    let lists = subjects(triples, first, &atoms);
+    triples.retain(|triple| !atoms.contains(&triple.subject) && !lists.contains(&triple.subject));
+    for triple in triples {
+        if let Object::Node(node) = &mut triple.object
+            && lists.contains(node)
+        {
+            *node = nil;
+        }
+    }
 }
 
 /// Collects the triples of a document. Blank nodes are numbered in order of appearance: parsers give random

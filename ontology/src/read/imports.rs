@@ -24,6 +24,7 @@ use percent_encoding::{AsciiSet, CONTROLS, percent_decode_str, utf8_percent_enco
 
 use super::document;
 use super::options::ReadOptions;
+use super::syntax;
 use crate::error::{Error, Errors};
 use crate::kb;
 use crate::triples::Document;
@@ -63,9 +64,9 @@ impl Resolver {
     pub(crate) fn new(options: &ReadOptions) -> Result<Self, Errors> {
         let (mut catalogs, mut errors) = (Vec::new(), Vec::new());
         for file in &options.catalogs {
-            match horned_catalog::Catalog::from_path(file) {
+            match catalog(file) {
                 Ok(catalog) => catalogs.push(catalog),
-                Err(error) => errors.push(Error::Catalog { file: file.clone(), reason: error.to_string() }),
+                Err(error) => errors.push(error),
             }
         }
         if !errors.is_empty() {
@@ -101,25 +102,47 @@ impl Resolver {
     }
 
     fn in_catalogs(&self, import: &str, importer: Option<&Path>) -> Result<Option<PathBuf>, Error> {
-        let mapped = self.catalogs.iter().find_map(|catalog| catalog.resolve(import));
-        if let Some(path) = mapped.filter(|path| path.is_file()) {
-            return Ok(Some(path));
-        }
-        let Some(file) = importer.and_then(Path::parent).map(|directory| directory.join(CATALOG)) else {
-            return Ok(None);
+        let targets = self.targets(import, importer)?;
+        Ok(targets.into_iter().flatten().find(|path| path.is_file()))
+    }
+
+    /// Returns the paths that the given catalogs, and the catalog next to the importing document, assign to an
+    /// import.
+    fn targets(&self, import: &str, importer: Option<&Path>) -> Result<[Option<PathBuf>; 2], Error> {
+        let given = self.catalogs.iter().find_map(|catalog| catalog.resolve(import));
+        let file = importer.and_then(Path::parent).map(|directory| directory.join(CATALOG));
+        let sibling = match file.filter(|file| file.is_file()) {
+            Some(file) => catalog(&file)?.resolve(import),
+            None => None,
         };
-        if !file.is_file() {
-            return Ok(None);
-        }
-        let catalog = horned_catalog::Catalog::from_path(&file)
-            .map_err(|error| Error::Catalog { file: file.clone(), reason: error.to_string() })?;
-        Ok(catalog.resolve(import).filter(|path| path.is_file()))
+        Ok([given, sibling])
+    }
+
+    /// Returns the path that a catalog assigns to an import without a document.
+    pub(crate) fn missing_target(&self, import: &str, importer: Option<&Path>) -> Option<PathBuf> {
+        self.targets(import, importer).ok()?.into_iter().flatten().next()
     }
 
     fn files(&self) -> &[OntologyFile] {
         self.files
             .get_or_init(|| self.directories.iter().flat_map(|root| candidates(root, MAX_DEPTH)).collect())
     }
+}
+
+/// Reads a catalog. Its `xml:base` is the directory of its entries; the library supports this attribute of groups
+/// only.
+fn catalog(file: &Path) -> Result<horned_catalog::Catalog, Error> {
+    let unusable = |reason: String| Error::Catalog { file: file.to_owned(), reason };
+    let text = std::fs::read_to_string(file).map_err(|error| unusable(error.to_string()))?;
+    let directory = file.parent().unwrap_or_else(|| Path::new("."));
+    let catalog = match syntax::root_attribute(text.as_bytes(), b"xml:base") {
+        Some(base) => {
+            let base = base.strip_prefix("file://").or_else(|| base.strip_prefix("file:")).unwrap_or(base);
+            horned_catalog::Catalog::from_str(&text, directory.join(base))
+        }
+        None => horned_catalog::Catalog::from_path(file),
+    };
+    catalog.map_err(|error| unusable(error.to_string()))
 }
 
 /// Characters that a path can contain, but the path of an IRI cannot.

@@ -182,7 +182,8 @@ fn closure(
                 }
                 Ok(None) => {
                     let (file, position) = (importer.name.clone(), position.clone());
-                    errors.push(Error::UnresolvedImport { file, position, import: import.clone() });
+                    let target = resolver.missing_target(import, paths[next].as_deref());
+                    errors.push(Error::UnresolvedImport { file, position, import: import.clone(), target });
                 }
                 Err(error) => errors.push(error),
             }

@@ -1,6 +1,8 @@
 //! Converts OWL/XML and functional-style documents to N-Triples. Input that horned-owl's readers do not handle
 //! is rewritten or rejected first.
 
+use std::borrow::Cow;
+
 use super::entities;
 use super::message::shortened;
 use super::syntax::{self, Syntax};
@@ -67,8 +69,57 @@ impl Structural<'_> {
             }
             None => self.malformed(fault.offset, &fault.message),
         };
-        horned::transcribe(self.text, self.syntax).map(relabelled).map_err(fault)
+        let text = without_double_inverses(words.clone());
+        horned::transcribe(&text, self.syntax).map(relabelled).map_err(fault)
     }
+}
+
+/// Replaces each axiom `InverseObjectProperties(p ObjectInverseOf(q))`, in which horned-owl accepts only names,
+/// by the equivalent `EquivalentObjectProperties(p q)`. The offsets of all other axioms remain.
+fn without_double_inverses(words: Words<'_>) -> Cow<'_, [u8]> {
+    const AXIOM: &[u8] = b"InverseObjectProperties";
+    const REPLACEMENT: &[u8] = b"EquivalentObjectProperties";
+    const INVERSE: &[u8] = b"ObjectInverseOf";
+    let text = words.text;
+    let mut result = Cow::Borrowed(text);
+    let mut words = words;
+    while let Some((start, word)) = words.next() {
+        if word != AXIOM {
+            continue;
+        }
+        // Offsets of the first inverse of the axiom, its opening and its closing parenthesis.
+        let (mut depth, mut inverse, mut open, mut close) = (0_usize, None, None, None);
+        for (offset, word) in words.clone() {
+            match word {
+                INVERSE if depth == 1 && inverse.is_none() => inverse = Some(offset),
+                b"(" => {
+                    if inverse.is_some() && open.is_none() {
+                        open = Some(offset);
+                    }
+                    depth += 1;
+                }
+                b")" => {
+                    depth = depth.saturating_sub(1);
+                    if open.is_some() && close.is_none() {
+                        close = Some(offset);
+                    }
+                }
+                _ => {}
+            }
+            if depth == 0 {
+                break;
+            }
+        }
+        let (Some(inverse), Some(open), Some(close)) = (inverse, open, close) else { continue };
+        let result = result.to_mut();
+        result[inverse..inverse + INVERSE.len()].fill(b' ');
+        result[open] = b' ';
+        result[close] = b' ';
+        // The replacement is longer than the name of the axiom, so that the text up to the inverse moves.
+        result.copy_within(start + AXIOM.len()..inverse, start + REPLACEMENT.len());
+        result[start..start + REPLACEMENT.len()].copy_from_slice(REPLACEMENT);
+    }
+    result
 }
 
 /// Nesting levels allowed in addition to those of an expression: ontology, axiom and annotations around
@@ -169,6 +220,33 @@ fn relabelled(ntriples: Vec<u8>) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn double_inverses_become_equivalences() {
+        for (text, expected) in [
+            ("InverseObjectProperties(:p :q)", "InverseObjectProperties(:p :q)"),
+            (
+                "InverseObjectProperties(:p ObjectInverseOf(:q)) A(:b)",
+                "EquivalentObjectProperties(:p :q ) A(:b)",
+            ),
+            (
+                "InverseObjectProperties(Annotation(:a \"ObjectInverseOf(\") ObjectInverseOf(<u:q>) :p)",
+                "EquivalentObjectProperties(Annotation(:a \"ObjectInverseOf(\") <u:q> :p)",
+            ),
+            (
+                "InverseObjectProperties(ObjectInverseOf(:q) ObjectInverseOf(:p))",
+                "EquivalentObjectProperties( :q ObjectInverseOf(:p))",
+            ),
+            ("InverseObjectProperties(:p ObjectInverseOf(", "InverseObjectProperties(:p ObjectInverseOf("),
+        ] {
+            let actual = without_double_inverses(Words { text: text.as_bytes(), cursor: 0 });
+            // The length remains, so that offsets after the axiom do.
+            assert_eq!(actual.len(), text.len(), "{text}");
+            let words: Vec<String> =
+                String::from_utf8_lossy(&actual).split_whitespace().map(str::to_owned).collect();
+            assert_eq!(words.join(" "), expected, "{text}");
+        }
+    }
 
     #[test]
     fn the_first_undeclared_prefix_is_found() {

@@ -95,6 +95,24 @@ fn xml_root(mut text: &[u8]) -> Option<(&[u8], &[u8])> {
     }
 }
 
+/// Returns the value of an attribute of the root element of an XML document.
+pub(super) fn root_attribute<'a>(text: &'a [u8], name: &[u8]) -> Option<&'a str> {
+    let (_, mut tail) = xml_root(text)?;
+    loop {
+        tail = tail.trim_ascii_start();
+        let end = tail.iter().position(|&byte| byte == b'=' || byte == b'>')?;
+        let (key, value) = tail.split_at(end);
+        let value = value.strip_prefix(b"=")?.trim_ascii_start();
+        let quote = *value.first().filter(|quote| b"\"'".contains(quote))?;
+        let value = &value[1..];
+        let (value, after) = value.split_at(value.iter().position(|&byte| byte == quote)?);
+        if key.trim_ascii_end() == name {
+            return std::str::from_utf8(value).ok();
+        }
+        tail = &after[1..];
+    }
+}
+
 /// Returns the name of the root element of an XML document, if the root element is not closed.
 pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
     let (root, tail) = xml_root(text)?;

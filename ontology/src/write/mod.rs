@@ -6,6 +6,8 @@
 //! other triples cause warnings.
 
 mod functional;
+mod xml;
+
 use std::path::Path;
 
 use oxrdf::{NamedNode, Triple};
@@ -60,7 +62,9 @@ pub fn convert_files<P: AsRef<Path>>(
             let text = functional::document(&ontology);
             let text = match syntax {
                 OutputSyntax::Functional => text,
-                _ => horned::owl_xml(text.as_bytes())
+                _ => xml::require_text(&text)
+                    .and_then(|()| horned::owl_xml(text.as_bytes()))
+                    .map(xml::escape_line_ends)
                     .map_err(|reason| vec![Error::Unwritable { syntax: "OWL/XML", reason }])?,
             };
             return Ok((text, ontology.warnings));
@@ -89,6 +93,9 @@ pub fn turtle(ntriples: &str) -> Result<String, Error> {
 }
 
 fn serialize(format: RdfFormat, triples: &[Triple]) -> Result<String, String> {
+    if format == RdfFormat::RdfXml {
+        xml::require_triples(triples)?;
+    }
     let mut serializer = RdfSerializer::from_format(format);
     for (prefix, namespace) in [
         ("owl", owl::NS),
@@ -117,6 +124,9 @@ fn serialize(format: RdfFormat, triples: &[Triple]) -> Result<String, String> {
     let mut text = String::from_utf8(bytes).map_err(|error| error.to_string())?;
     if !text.is_empty() && !text.ends_with('\n') {
         text.push('\n');
+    }
+    if format == RdfFormat::RdfXml {
+        text = xml::escape_line_ends(text);
     }
     Ok(text)
 }

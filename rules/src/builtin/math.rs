@@ -9,10 +9,12 @@ use num_traits::{Signed, ToPrimitive, Zero};
 use super::signature::BuiltIn;
 use crate::literal::{Decimal, Literal, ten_to};
 
-/// Maximum absolute exponent of an exact power, and maximum number of digits for rounding decimals. A power
-/// with a larger exponent has no result. A larger number of digits counts as the maximum, or has no result if it
-/// exceeds `i32`.
+/// Maximum absolute exponent of an exact power. A power with a larger exponent has no result.
 const MAX_EXPONENT: u32 = 1000;
+
+/// Maximum number of digits for rounding; a double has at most 1074 fractional digits. A larger number counts as
+/// the maximum, or has no result for a decimal if it exceeds `i32`.
+const MAX_DIGITS: i32 = 1100;
 
 enum Numbers {
     Exact(Vec<BigRational>),
@@ -27,6 +29,15 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
         return Some(Literal::Boolean(!value));
     }
     match promote(arguments)? {
+        Numbers::Float(values) if built_in == BuiltIn::RoundHalfToEven => {
+            rounded_float(&values).map(Literal::float)
+        }
+        Numbers::Double(values) if built_in == BuiltIn::RoundHalfToEven => {
+            rounded_float(&values).map(Literal::double)
+        }
+        Numbers::Float(values) | Numbers::Double(values) if built_in == BuiltIn::IntegerDivide => {
+            integer_quotient(&values)
+        }
         Numbers::Exact(values) => exact(built_in, &values),
         Numbers::Float(values) => inexact(built_in, &values).map(|value| Literal::float(value as f32)),
         Numbers::Double(values) => inexact(built_in, &values).map(Literal::double),
@@ -81,14 +92,55 @@ fn integer_power(base: &BigRational, exponent: &BigRational) -> Option<BigRation
 }
 
 fn round_half_to_even(value: &BigRational, digits: i32) -> BigRational {
-    let unit = BigRational::from_integer(ten_to(digits.unsigned_abs().min(MAX_EXPONENT)));
-    let scaled = if digits >= 0 { value * &unit } else { value / &unit };
+    let digits = digits.clamp(-MAX_DIGITS, MAX_DIGITS);
+    let (units, unit) = (rounded_units(value, digits), ten_to(digits.unsigned_abs()));
+    if digits >= 0 { BigRational::new(units, unit) } else { BigRational::from_integer(units * unit) }
+}
+
+/// Returns a value in units of 10<sup>-digits</sup>, rounded half to even.
+fn rounded_units(value: &BigRational, digits: i32) -> BigInt {
+    let unit = BigRational::from_integer(ten_to(digits.unsigned_abs()));
+    let scaled = if digits >= 0 { value * unit } else { value / unit };
     let floor = scaled.floor().to_integer();
     let half = BigRational::new(1.into(), 2.into());
     let fraction = &scaled - BigRational::from_integer(floor.clone());
     let rounds_up = fraction > half || (fraction == half && floor.bit(0));
-    let rounded = BigRational::from_integer(floor + BigInt::from(i32::from(rounds_up)));
-    if digits >= 0 { rounded / unit } else { rounded * unit }
+    floor + BigInt::from(i32::from(rounds_up))
+}
+
+/// Rounds a float half to even, by way of its exact decimal value. The second value is the number of
+/// fractional digits, by default 0.
+fn rounded_float<F: std::str::FromStr>(values: &[f64]) -> Option<F> {
+    let (value, digits) = match *values {
+        [value] => (value, 0.0),
+        [value, digits] => (value, digits),
+        _ => return None,
+    };
+    // NaN and infinite values have no exact value. Zeros keep their signs.
+    let text = match BigRational::from_float(value) {
+        Some(exact) => {
+            let digits = digits.clamp(f64::from(-MAX_DIGITS), f64::from(MAX_DIGITS)) as i32;
+            let units = rounded_units(&exact.abs(), digits);
+            format!("{}{units}e{}", if value.is_sign_negative() { "-" } else { "" }, -digits)
+        }
+        None => value.to_string(),
+    };
+    text.parse().ok()
+}
+
+/// Returns the `xsd:integer` quotient of two floats, truncated toward zero. `None` for a division by 0, of an
+/// infinite number, or of NaN.
+fn integer_quotient(values: &[f64]) -> Option<Literal> {
+    let [dividend, divisor] = *values else { return None };
+    let quotient = BigRational::from_float((dividend / divisor).trunc())?;
+    Some(Literal::Decimal(Decimal::from_rational(&quotient)))
+}
+
+/// Rounds a number, half toward positive infinity. The result has the sign of the number.
+pub(super) fn round(value: f64) -> f64 {
+    // Adding 0.5 first would round 0.49999999999999994 and odd integers above 2^52 up.
+    let floor = value.floor();
+    if value - floor >= 0.5 { (floor + 1.0).copysign(value) } else { floor }
 }
 
 fn inexact(built_in: BuiltIn, values: &[f64]) -> Option<f64> {
@@ -97,21 +149,14 @@ fn inexact(built_in: BuiltIn, values: &[f64]) -> Option<f64> {
         (BuiltIn::Multiply, _) => values.iter().product(),
         (BuiltIn::Subtract, [a, b]) => a - b,
         (BuiltIn::Divide, [a, b]) => a / b,
-        (BuiltIn::IntegerDivide, [a, b]) if *b != 0.0 && (a / b).is_finite() => (a / b).trunc(),
         (BuiltIn::Mod, [a, b]) => a % b,
         (BuiltIn::Pow, [a, b]) => a.powf(*b),
         (BuiltIn::UnaryPlus, [a]) => *a,
         (BuiltIn::UnaryMinus, [a]) => -a,
         (BuiltIn::Abs, [a]) => a.abs(),
         (BuiltIn::Ceiling, [a]) => a.ceil(),
-        // Adding 0.5 first would round 0.49999999999999994 and odd integers above 2^52 up.
-        (BuiltIn::Round, [a]) if a - a.floor() >= 0.5 => a.floor() + 1.0,
-        (BuiltIn::Floor | BuiltIn::Round, [a]) => a.floor(),
-        (BuiltIn::RoundHalfToEven, [a]) => a.round_ties_even(),
-        (BuiltIn::RoundHalfToEven, [a, digits]) => {
-            let unit = 10_f64.powi(digits.clamp(-300.0, 300.0) as i32);
-            (a * unit).round_ties_even() / unit
-        }
+        (BuiltIn::Round, [a]) => round(*a),
+        (BuiltIn::Floor, [a]) => a.floor(),
         (BuiltIn::Sin, [a]) => a.sin(),
         (BuiltIn::Cos, [a]) => a.cos(),
         (BuiltIn::Tan, [a]) => a.tan(),

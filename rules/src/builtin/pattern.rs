@@ -1,5 +1,5 @@
 //! Regular expressions of `XPath`: matching, replacement and tokenisation. Patterns are translated to the
-//! syntax of the `regex` crate, which supports neither back references nor names of Unicode blocks. An
+//! syntax of the `regex` crate, which supports neither back references nor names of Unicode blocks (`\p{IsGreek}`). An
 //! invalid constant pattern is an error of its rule (R210). An invalid pattern in a variable makes the
 //! built-in false.
 //!
@@ -66,7 +66,7 @@ fn compile(pattern: &str, flags: &str) -> Option<Regex> {
 }
 
 fn build(pattern: &str, flags: &str) -> Result<Regex, String> {
-    let translated = translate(pattern)?;
+    let translated = translate(pattern, flags.contains('x'))?;
     let mut builder = RegexBuilder::new(&translated);
     builder.size_limit(SIZE_LIMIT).dfa_size_limit(SIZE_LIMIT);
     for flag in flags.chars() {
@@ -74,7 +74,8 @@ fn build(pattern: &str, flags: &str) -> Result<Regex, String> {
             's' => builder.dot_matches_new_line(true),
             'm' => builder.multi_line(true),
             'i' => builder.case_insensitive(true),
-            'x' => builder.ignore_whitespace(true),
+            // `translate` removes the white space: the `regex` crate would remove it in classes, too.
+            'x' => &mut builder,
             _ => return Err(format!("`{flag}` is not a flag; there are s, m, i and x")),
         };
     }
@@ -91,10 +92,19 @@ const NAME_START: &str = ":A-Z_a-z\\x{C0}-\\x{D6}\\x{D8}-\\x{F6}\\x{F8}-\\x{2FF}
 /// Additional characters within an XML name.
 const NAME_CONTINUE: &str = "\\-.0-9\\x{B7}\\x{300}-\\x{36F}\\x{203F}-\\x{2040}";
 
+/// The classes `\w` and `\W` of XML Schema, part 2, appendix G.
+const WORD: &str = "[^\\p{P}\\p{Z}\\p{C}]";
+const NO_WORD: &str = "[\\p{P}\\p{Z}\\p{C}]";
+
+fn is_space(character: char) -> bool {
+    matches!(character, ' ' | '\t' | '\n' | '\r')
+}
+
 /// Translates a pattern of `XPath` to the syntax of the `regex` crate: `[a-z-[aeiou]]` (subtraction of classes)
-/// becomes `[a-z--[aeiou]]`, and `\i` and `\c` are expanded. Returns an error for a back reference, for a backslash
-/// at the end, and for a class within a class that is not subtracted.
-fn translate(pattern: &str) -> Result<String, String> {
+/// becomes `[a-z--[aeiou]]`, and `\i`, `\c`, `\w`, `\s` and their complements are expanded. With `is_spaced` (flag
+/// `x`), white space outside of classes is removed. Returns an error for a back reference, for the name of a block,
+/// for a backslash at the end, and for a class within a class that is not subtracted.
+fn translate(pattern: &str, is_spaced: bool) -> Result<String, String> {
     let mut translated = String::new();
     // Nesting depth of classes, and a flag that is set while the innermost class has no members yet.
     let (mut depth, mut is_empty) = (0, false);
@@ -103,8 +113,17 @@ fn translate(pattern: &str) -> Result<String, String> {
         let was_empty = std::mem::replace(&mut is_empty, false);
         match character {
             '\\' => {
+                while is_spaced && depth == 0 && characters.next_if(|&next| is_space(next)).is_some() {}
                 let escaped = characters.next().ok_or("it ends with a backslash")?;
                 match escaped {
+                    'w' => translated += WORD,
+                    'W' => translated += NO_WORD,
+                    's' => translated += "[ \\t\\n\\r]",
+                    'S' => translated += "[^ \\t\\n\\r]",
+                    'p' | 'P' if characters.clone().take(3).eq("{Is".chars()) => {
+                        let name: String = characters.take_while(|&next| next != '}').skip(1).collect();
+                        return Err(format!("the name of a Unicode block, `{name}`, is not supported"));
+                    }
                     'i' => translated.extend(["[", NAME_START, "]"]),
                     'c' => translated.extend(["[", NAME_START, NAME_CONTINUE, "]"]),
                     'I' => translated.extend(["[^", NAME_START, "]"]),
@@ -140,8 +159,7 @@ fn translate(pattern: &str) -> Result<String, String> {
             }
             // `&&` and `~~` are set operations of the `regex` crate, but ordinary characters in `XPath`.
             '&' | '~' if depth > 0 => translated.extend(['\\', character]),
-            // With the flag `x`, `#` would begin a comment in the `regex` crate.
-            '#' => translated += "\\#",
+            space if is_spaced && depth == 0 && is_space(space) => {}
             other => translated.push(other),
         }
     }

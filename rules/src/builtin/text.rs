@@ -1,18 +1,26 @@
 //! String tests and functions on characters (not bytes), as defined by `XPath`.
 
+use super::math;
 use super::signature::BuiltIn;
 use crate::literal::Literal;
 
 pub(super) fn test(built_in: BuiltIn, left: &Literal, right: &Literal) -> bool {
     let (Some(left), Some(right)) = (as_text(left), as_text(right)) else { return false };
     match built_in {
-        BuiltIn::StringEqualIgnoreCase => left.to_lowercase() == right.to_lowercase(),
+        BuiltIn::StringEqualIgnoreCase => folded(left) == folded(right),
         BuiltIn::Contains => left.contains(right),
-        BuiltIn::ContainsIgnoreCase => left.to_lowercase().contains(&right.to_lowercase()),
+        BuiltIn::ContainsIgnoreCase => folded(left).contains(&folded(right)),
         BuiltIn::StartsWith => left.starts_with(right),
         BuiltIn::EndsWith => left.ends_with(right),
         _ => false,
     }
+}
+
+/// Converts a text to lower case, each character independently of its neighbours. `str::to_lowercase` is
+/// different for a sigma at the end of a word.
+fn folded(text: &str) -> String {
+    let lower = text.chars().flat_map(char::to_lowercase);
+    lower.map(|character| if character == 'ς' { 'σ' } else { character }).collect()
 }
 
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
@@ -51,7 +59,7 @@ pub(super) fn as_text(literal: &Literal) -> Option<&str> {
 /// Computes `XPath`'s `fn:substring`. Positions are counted from 1 and rounded, and positions outside the
 /// text are ignored.
 fn substring(text: &str, bounds: &[&Literal]) -> Option<String> {
-    let round = |literal: &Literal| literal.as_f64().map(|value| (value + 0.5).floor());
+    let round = |literal: &Literal| literal.as_f64().map(math::round);
     let start = round(bounds.first()?)?;
     let end = match bounds.get(1) {
         Some(length) => start + round(length)?,

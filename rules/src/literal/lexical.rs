@@ -6,7 +6,7 @@ use num_traits::Zero;
 
 use super::datatype::{OWL_RATIONAL, RDF, XSD, integer_range};
 use super::decimal::{self, Decimal};
-use super::temporal::{Duration, Moment};
+use super::temporal::{Duration, Moment, within_limits};
 use super::value::Literal;
 use super::{binary, text};
 
@@ -36,9 +36,20 @@ impl Literal {
     }
 }
 
+impl Literal {
+    /// Returns `true` for a valid moment or duration with a number that exceeds the limits of the program. Nothing
+    /// but its datatype is known.
+    pub fn exceeds_limits(&self) -> bool {
+        let Self::Opaque { datatype, .. } = self else { return false };
+        let local = datatype.strip_prefix(XSD);
+        local.is_some_and(|local| !matches!(parse_xsd("", local), Parsed::Unknown))
+    }
+}
+
 pub(super) enum Parsed {
     Value(Literal),
     IllTyped,
+    /// A value of an unsupported datatype, or a valid value beyond the limits of the program.
     Unknown,
 }
 
@@ -59,7 +70,7 @@ pub(super) fn parse_xsd(lexical: &str, local: &str) -> Parsed {
         "normalizedString" | "token" | "language" | "Name" | "NCName" | "NMTOKEN" => {
             text::parse(lexical, local).map(|text| Literal::String(text.into()))
         }
-        "anyURI" => Some(Literal::Uri(collapsed.into())),
+        "anyURI" => text::parse(lexical, "token").map(|text| Literal::Uri(text.into())),
         "boolean" => match collapsed {
             "true" | "1" => Some(Literal::Boolean(true)),
             "false" | "0" => Some(Literal::Boolean(false)),
@@ -69,10 +80,18 @@ pub(super) fn parse_xsd(lexical: &str, local: &str) -> Parsed {
         "float" => parse_float(collapsed).map(Literal::float),
         "double" => parse_float(collapsed).map(Literal::double),
         "dateTime" | "dateTimeStamp" | "date" | "time" => {
-            Moment::parse(collapsed, local).map(Literal::Moment)
+            let parse = |text: &str| Moment::parse(text, local).map(Literal::Moment);
+            match parse(collapsed) {
+                None if parse(&within_limits(collapsed, local)).is_some() => return Parsed::Unknown,
+                moment => moment,
+            }
         }
         "duration" | "dayTimeDuration" | "yearMonthDuration" => {
-            Duration::parse(collapsed, local).map(Literal::Duration)
+            let parse = |text: &str| Duration::parse(text, local).map(Literal::Duration);
+            match parse(collapsed) {
+                None if parse(&within_limits(collapsed, local)).is_some() => return Parsed::Unknown,
+                duration => duration,
+            }
         }
         "gYear" | "gYearMonth" | "gMonth" | "gMonthDay" | "gDay" => {
             binary::recurring(collapsed, local).map(|(text, local)| Literal::Recurring(text, local))

@@ -126,7 +126,10 @@ impl Moment {
     /// conditions of [`Moment::since`], and if [`Moment::later`] has no result.
     pub(crate) fn months_since(&self, other: &Self) -> Option<Duration> {
         let negative = self.since(other)?.seconds < Decimal::from(0);
-        let (late, early) = if negative { (other, self) } else { (self, other) };
+        // The calendar months of two time zones are not comparable. As a date with time, the start of a day
+        // remains exact in UTC.
+        let [this, other] = [self, other].map(|moment| moment.in_utc().as_date_time());
+        let (late, early) = if negative { (&other, &this) } else { (&this, &other) };
         let parts = |moment: &Self| {
             let (day, _) = split_day(&moment.local());
             let (year, month, _) = civil_from_days(day);
@@ -236,7 +239,7 @@ impl Duration {
             .checked_add(minutes.checked_mul(60)?)?;
         let seconds = add_seconds(&seconds, whole);
         let forbidden = match local {
-            "dayTimeDuration" => months != 0,
+            "dayTimeDuration" => body.split('T').next().is_some_and(|date| date.contains(['Y', 'M'])),
             "yearMonthDuration" => body.contains(['D', 'T']),
             _ => false,
         };
@@ -299,12 +302,21 @@ impl Duration {
 
 impl PartialOrd for Duration {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        // Months and seconds are compared separately, since a month has no fixed length.
         let (months, seconds) = (self.months.cmp(&other.months), self.seconds.cmp(&other.seconds));
         match (months, seconds) {
             (Ordering::Equal, order) | (order, Ordering::Equal) => Some(order),
             (a, b) if a == b => Some(a),
-            _ => None,
+            // A month has no fixed length. The order must be the same from four dates on (XML Schema 1.1, part
+            // 2, section 3.3.6).
+            _ => {
+                let dates = ["1696-09-01", "1697-02-01", "1903-03-01", "1903-07-01"];
+                let mut orders = dates.into_iter().map(|date| {
+                    let start = Moment::parse(&format!("{date}T00:00:00Z"), "dateTime")?;
+                    Some(start.later(self)?.seconds.cmp(&start.later(other)?.seconds))
+                });
+                let first = orders.next().flatten().filter(|order| order.is_ne())?;
+                orders.all(|order| order == Some(first)).then_some(first)
+            }
         }
     }
 }
@@ -334,6 +346,34 @@ fn take_field(text: &str, unit: char) -> Option<(i64, &str)> {
         Some(_) => None,
         None => Some((0, text)),
     }
+}
+
+/// Replaces the numbers of a moment or duration that may exceed the limits of [`Moment`] and [`Duration`] by
+/// smaller ones, such that the text is valid for the datatype `local` exactly if it was valid.
+pub(super) fn within_limits(lexical: &str, local: &str) -> String {
+    const MAX_DIGITS: usize = 9;
+    let is_duration = local.ends_with("uration");
+    let (mut result, mut tail) = (String::new(), lexical);
+    while let Some(start) = tail.find(|c: char| c.is_ascii_digit()) {
+        let (before, digits_on) = tail.split_at(start);
+        let length = digits_on.bytes().take_while(u8::is_ascii_digit).count();
+        let (digits, after) = digits_on.split_at(length);
+        let is_first = result.is_empty();
+        result += before;
+        // The fraction of a second has no limit.
+        let is_long = length > MAX_DIGITS && !before.ends_with('.');
+        match digits.as_bytes().first() {
+            Some(_) if is_long && is_duration => result.push('1'),
+            // 20,000 years are a multiple of the period of the calendar.
+            Some(b'1'..=b'9') if is_long && is_first => {
+                result.push('2');
+                result += &digits[length - 4..];
+            }
+            _ => result += digits,
+        }
+        tail = after;
+    }
+    result + tail
 }
 
 fn negate(value: &Decimal) -> Decimal {

@@ -43,8 +43,8 @@ pub enum Literal {
     Base64(Box<[u8]>),
     /// `xsd:anyURI`.
     Uri(Box<str>),
-    /// A literal of an unsupported datatype, a rational number that is not a decimal (in lowest terms), or
-    /// an XML literal.
+    /// A literal of an unsupported datatype, a rational number that is not a decimal (in lowest terms), an XML
+    /// literal, or a moment or duration with a number of more than nine digits that exceeds the limits.
     Opaque {
         /// Lexical form as written; for a rational number, in lowest terms.
         lexical: Box<str>,
@@ -161,7 +161,7 @@ impl Literal {
     /// Compares two values, with numeric promotion. Returns `None` if they are incomparable:
     /// - values of different kinds, NaN and ill-typed literals;
     /// - different values of a kind without an order, such as binary data or tagged strings;
-    /// - durations whose months and seconds are in opposite orders;
+    /// - durations whose order depends on the lengths of months;
     /// - moments with and without a time zone whose order depends on the time zone.
     pub fn compare(&self, other: &Self) -> Option<Ordering> {
         match (self, other) {

@@ -49,18 +49,21 @@ struct Lexer {
     cursor: usize,
     line: u32,
     column: u32,
+    /// Error within the current token, whose end is known.
+    error: Option<String>,
 }
 
 /// Splits a text into tokens, terminated by [`Token::End`]. Unexpected characters and incomplete tokens are reported
 /// and skipped.
 pub(super) fn tokens(text: &str) -> (Vec<Spanned>, Vec<Fault>) {
-    let mut lexer = Lexer { characters: text.chars().collect(), cursor: 0, line: 1, column: 1 };
+    let mut lexer = Lexer { characters: text.chars().collect(), cursor: 0, line: 1, column: 1, error: None };
     let (mut tokens, mut faults) = (Vec::new(), Vec::new());
     loop {
         lexer.skip_blank();
         let (line, column) = (lexer.line, lexer.column);
         match lexer.next() {
             Ok(token) => {
+                faults.extend(lexer.error.take().map(|message| Fault { message, line, column }));
                 let end = token == Token::End;
                 tokens.push(Spanned { token, line, column });
                 if end {
@@ -252,7 +255,11 @@ impl Lexer {
                     Some('r') => '\r',
                     Some('t') => '\t',
                     Some(c @ ('"' | '\\')) => c,
-                    _ => return Err("unknown escape in a string".into()),
+                    // The string is read to its end, so that its text is not taken for rules.
+                    other => {
+                        self.error = Some("unknown escape in a string".into());
+                        other.unwrap_or_default()
+                    }
                 }),
                 other => text.push(other),
             }
