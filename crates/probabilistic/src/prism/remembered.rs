@@ -90,6 +90,10 @@ impl<N: Number> Generator<N> for Remembered<'_, N> {
         Generator::rewards(self.program)
     }
 
+    fn loop_rewards(&self, state: &Packed) -> Result<Vec<N>, Error> {
+        self.program.loop_rewards(state)
+    }
+
     fn codes(&self) -> Option<usize> {
         self.program.codes()
     }

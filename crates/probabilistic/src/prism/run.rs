@@ -231,6 +231,11 @@ impl<N: Number> Program<N> {
         sum(&self.rewards[structure].states, values)
     }
 
+    /// Returns the number of items of a reward structure that define state rewards.
+    pub(crate) fn state_reward_count(&self, structure: usize) -> usize {
+        self.rewards[structure].states.len()
+    }
+
     pub(super) fn state_rewards(&self, values: &[i64]) -> Result<Sums<N>, Error> {
         self.computed_rewards.iter().map(|structure| sum(&self.rewards[*structure].states, values)).collect()
     }
@@ -380,6 +385,11 @@ impl<N: Number> Generator<N> for Program<N> {
 
     fn rewards(&self) -> usize {
         self.computed_rewards.len()
+    }
+
+    /// Returns the state rewards: the added loop has no action, and therefore no transition rewards.
+    fn loop_rewards(&self, state: &Packed) -> Result<Vec<N>, Error> {
+        Ok(self.state_rewards(&self.values_of(state))?.into_vec())
     }
 
     fn codes(&self) -> Option<usize> {
