@@ -144,6 +144,62 @@ fn step_bounded_values_are_enclosed() {
 }
 
 #[test]
+fn rewards_without_a_step_are_enclosed() {
+    let model = "dtmc module m s:[0..1] init 0; [] true -> (s'=1-s); endmodule
+        rewards \"r\" s=0 : 2/3; s=0 : 1/7; s=1 : 3; endrewards
+        rewards \"whole\" s=0 : 2; s=0 : 3; endrewards";
+    for steps in [0, 1, 2] {
+        enclosed(model, &format!("R{{\"r\"}}=? [ I={steps} ]"));
+    }
+    let whole = value(model, "R{\"whole\"}=? [ I=0 ]", Exactness::Never);
+    assert_eq!([whole.lower, whole.upper].map(f64::to_bits), [5.0, 5.0].map(f64::to_bits));
+    let two_thirds = outcome(
+        &model.replace("s=0 : 1/7;", ""),
+        "R{\"r\"}<2/3 [ I=0 ]",
+        &Options::default().with_exactness(Exactness::Never),
+    );
+    assert!(matches!(two_thirds, Ok(Outcome::Undecided(_))), "{two_thirds:?}");
+}
+
+#[test]
+fn policies_start_in_all_initial_states() {
+    let model = "mdp
+        module m s:[0..5]; [a] s<5 -> 0.5:(s'=5) + 0.5:true; [b] s<5 -> 0.5:(s'=5) + 0.5:(s'=0); endmodule
+        init s=1 | s=3 endinit
+        label \"goal\" = s=5;";
+    let question = "Pmax=? [ F \"goal\" ]";
+    let parsed = prism::parse(model).expect("a model");
+    let property = property::parse(question).expect("a property");
+    let report = check(&parsed, &property, &Options::default().with_policy(true)).expect("an answer");
+    let table = report.policy.expect("a policy");
+    let mut listed: Vec<_> =
+        table.rows.iter().map(|row| row.values[0]).filter(|s| [1, 3].contains(s)).collect();
+    listed.sort_unstable();
+    assert_eq!(listed, [1, 3]);
+    let answer = outcome(model, question, &Options::default().with_evaluation(Some(table)));
+    let Ok(Outcome::Range(least, greatest)) = answer else { panic!("{answer:?}") };
+    for end in [least, greatest] {
+        assert_eq!(
+            end.quantity().and_then(|quantity| quantity.exact.clone()),
+            Some(BigRational::from_integer(1.into()))
+        );
+    }
+}
+
+#[test]
+fn a_policy_without_states_is_evaluated() {
+    let model = "mdp module m s:[0..1] init 0; [go] s=0 -> (s'=1); endmodule label \"goal\" = s=1;";
+    let policy = "{\"format\": \"metaplan-policy/1\", \"states\": []}";
+    for (question, expected) in [("Pmax=? [ F \"goal\" ]", "0"), ("Pmax=? [ F s=0 ]", "1")] {
+        let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
+        let answer =
+            outcome(model, question, &Options::default().with_evaluation(evaluate)).expect("an answer");
+        let Outcome::Value(Answer::Finite(answer)) = answer else { panic!("{answer:?}") };
+        assert_eq!(answer.exact.map(|exact| exact.to_string()).as_deref(), Some(expected), "{question}");
+    }
+}
+
+#[test]
 fn a_policy_is_evaluated_over_bounded_steps() {
     let model = "mdp
         module m s:[0..2] init 0; [slow] s=0 -> 0.1:(s'=1) + 0.9:(s'=0); [fast] s=0 -> 0.5:(s'=1) + 0.5:(s'=2); endmodule

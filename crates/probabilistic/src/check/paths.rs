@@ -7,7 +7,7 @@ use crate::check::ask::{Checked, property_error, refusal, within_budget};
 use crate::check::query::Query;
 use crate::check::steps;
 use crate::check::vector::{Span, Vector};
-use crate::number::Number;
+use crate::number::{Number, count, is_whole};
 use crate::policy::with_secondary;
 use crate::prism::ast::{ModelKind, Path, RewardPath, StepBound, Steps};
 use crate::solve::{Direction, Problem, Solution, draft, solve_within};
@@ -150,7 +150,11 @@ impl<N: Number> Query<'_, N> {
         // `validate` has checked that the bound is an integer.
         let limit = self.constant(&bound.limit)?.to_integer() + offset;
         Ok(limit.to_u32().filter(|most| *most < MAX_STEPS).ok_or_else(|| {
-            let text = "the number of steps must be at least 0 and below 10^9";
+            let text = if offset < 0 {
+                "the number of steps must be at least 1 and at most 10^9 for `<`"
+            } else {
+                "the number of steps must be at least 0 and below 10^9"
+            };
             property_error("Q503", bound.limit.place, text)
         })?)
     }
@@ -172,7 +176,12 @@ impl<N: Number> Query<'_, N> {
             RewardPath::Instant(limit) => {
                 let limit = self.at_most(&StepBound { limit: limit.clone(), strict: false })?;
                 let values = self.state_rewards(name)?;
-                let stepped = self.stepped(self.problem(direction, None, &no_states), values, limit)?;
+                // A sum of rewards is exact if it is an integer. Otherwise, each reward and each addition is rounded.
+                let is_exact = N::EXACT || values.iter().all(|value| is_whole(value.to_f64()));
+                let mut stepped = self.stepped(self.problem(direction, None, &no_states), values, limit)?;
+                if !is_exact {
+                    stepped.relative += (count(self.state_reward_count(name)?) + 1.0) * f64::EPSILON;
+                }
                 Ok(Vector::stepped(stepped, Span::Positive).into())
             }
             RewardPath::Total => self.total(direction, self.rewards(name)?),
