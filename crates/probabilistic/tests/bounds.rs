@@ -129,6 +129,31 @@ fn nearly_integral_rewards_are_enclosed() {
     assert_eq!([whole.lower, whole.upper].map(f64::to_bits), [7.0, 7.0].map(f64::to_bits));
 }
 
+/// The doubles next to 1/2 are exact, and so is their sum, but not the sum of the rewards.
+#[test]
+fn rewards_with_an_integral_sum_in_doubles_are_enclosed() {
+    let half = "0.49999999999999999999";
+    let command = "dtmc module m s:[0..1] init 0; [a] s=0 -> (s'=1); endmodule";
+    for (question, rewards) in [
+        ("R=? [ F s=1 ]", format!("s=0 : 0.5; s=0 : {half};")),
+        ("R=? [ F s=1 ]", format!("s=0 : 0.5; [a] true : {half};")),
+        ("R=? [ I=0 ]", format!("s=0 : 0.5; s=0 : {half};")),
+    ] {
+        let module = "module n t:[0..1] init 0; endmodule";
+        for model in [
+            format!("{command} rewards {rewards} endrewards"),
+            format!("{command} {module} rewards {rewards} endrewards"),
+        ] {
+            enclosed(&model, question);
+        }
+    }
+    let cycle = format!(
+        "mdp module m s:[0..2] init 0; [a] s=0 -> (s'=1); [b] s=1 -> (s'=0); [c] s=1 -> (s'=2); endmodule
+         rewards [a] true : {half}; endrewards"
+    );
+    enclosed(&cycle, "Rmin=? [ F s=2 ]");
+}
+
 #[test]
 fn step_bounded_values_are_enclosed() {
     let model = "dtmc

@@ -131,9 +131,9 @@ mod tests {
                 VerifiedPart { part: "proof", result: Err(forged.to_owned()) },
             ],
         };
-        let shown = "1\\nverified: the plan is optimal\\tx\\u{1b}[2J";
+        let escaped = "1\\nverified: the plan is optimal\\tx\\u{1b}[2J";
         let expected = format!(
-            "files       verified: {shown}\nproof       failed: {shown}\nNOT verified: the plan is optimal, metric {shown}\n"
+            "files       verified: {escaped}\nproof       failed: {escaped}\nNOT verified: the plan is optimal, metric {escaped}\n"
         );
         assert_eq!(report.to_string(), expected);
         report.parts.pop();
@@ -141,7 +141,7 @@ mod tests {
         report.claim = Some(Claim::Front(crate::manifest::Front { objectives, points: Vec::new() }));
         let text = report.to_string();
         let verdict = format!(
-            "verified: the front of {shown} and (cost) has exactly 0 points, for the mission `{shown}` with digest "
+            "verified: the front of {escaped} and (cost) has exactly 0 points, for the mission `{escaped}` with digest "
         );
         assert!(text.lines().nth(1).is_some_and(|line| line.starts_with(&verdict)), "{text}");
         assert_eq!(text.lines().count(), 2, "{text}");

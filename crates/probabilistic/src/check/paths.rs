@@ -5,7 +5,7 @@ use num_traits::ToPrimitive;
 
 use crate::check::ask::{Checked, property_error, refusal, within_budget};
 use crate::check::query::Query;
-use crate::check::steps;
+use crate::check::steps::{self, Stepped};
 use crate::check::vector::{Span, Vector};
 use crate::number::{Number, count, is_whole};
 use crate::policy::with_secondary;
@@ -112,16 +112,18 @@ impl<N: Number> Query<'_, N> {
         let (no_states, outside) = (FixedBitSet::with_capacity(left.len()), inverse(left.clone()));
         let before = Problem { blocked: Some(&outside), ..self.problem(direction, None, &no_states) };
         let errors = then.errors;
-        let mut values = self.stepped(before, then.values, 1)?.values;
+        let Stepped { mut values, relative, lost } = self.stepped(before, then.values, 1)?;
         for state in outside.ones() {
             values[state] = N::zero();
         }
-        let stepped = self.stepped(before, values, least.saturating_sub(1))?;
+        let mut stepped = self.stepped(before, values, least.saturating_sub(1))?;
+        // The step that was computed separately rounds, too. Its error is not yet counted.
+        stepped.relative += relative;
+        stepped.lost |= lost;
         let mut vector = Vector::stepped(stepped, Span::Probability);
         let first = errors.iter().fold(0.0_f64, |most, error| most.max(*error));
-        for (error, value) in vector.errors.iter_mut().zip(&vector.values) {
-            // The step that was computed separately rounds, too. Its error is not yet counted.
-            *error += first + 64.0 * f64::EPSILON * value.to_f64();
+        for error in &mut vector.errors {
+            *error += first;
         }
         Ok(vector.into())
     }
@@ -194,7 +196,7 @@ impl<N: Number> Query<'_, N> {
 
     /// Applies the Bellman operator `steps` times to `values`, the values after the last step. If a policy is
     /// given, only its choices are considered.
-    fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Checked<steps::Stepped<N>> {
+    fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Checked<Stepped<N>> {
         let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };
         within_budget(steps::apply(problem, values, steps, &mut self.work.borrow_mut()))
     }

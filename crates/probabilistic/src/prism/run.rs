@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 use crate::error::{Diagnostic, Error, Place};
 use crate::explore::{Choices, Generator};
 use crate::mdp::dense;
-use crate::number::Number;
+use crate::number::{Number, sum_of_rewards};
 use crate::prism::ast::ModelKind;
 use crate::prism::code::{Code, Fault, rounded};
 use crate::prism::command::{Command, RewardItem, Variable};
@@ -297,7 +297,8 @@ impl<N: Number> Program<N> {
     ) -> Result<(), Error> {
         let state_sums = self.state_rewards(values)?;
         let rewards = |action_sums: &Sums<N>| {
-            let sums: Sums<N> = state_sums.iter().zip(action_sums).map(|(a, b)| a.plus(b)).collect();
+            let sums: Sums<N> =
+                state_sums.iter().zip(action_sums).map(|(a, b)| sum_of_rewards(a, b)).collect();
             sums
         };
         for group in &self.free {
@@ -361,7 +362,7 @@ impl<N: Number> Program<N> {
             let rewards = self.action_rewards(joint.action, values)?;
             joint.each(|chosen| {
                 for (sum, reward) in total.iter_mut().zip(&rewards) {
-                    *sum = sum.plus(&share(reward));
+                    *sum = sum_of_rewards(sum, &share(reward));
                 }
                 self.expand(state, joint, chosen, |next, probability| choices.to(next, share(&probability)));
                 Ok::<(), Error>(())
@@ -425,7 +426,7 @@ fn sum<N: Number>(items: &[RewardItem<N>], values: &[i64]) -> Result<N, Error> {
         let fault = |fault| at(fault, item.place);
         if item.guard.holds(values).map_err(fault)? {
             if let Some(reward) = &item.certain {
-                sum = sum.plus(reward);
+                sum = sum_of_rewards(&sum, reward);
                 continue;
             }
             let reward = item.reward.number(values).map_err(fault)?;
@@ -433,7 +434,7 @@ fn sum<N: Number>(items: &[RewardItem<N>], values: &[i64]) -> Result<N, Error> {
                 let text = format!("a negative reward, {}", Number::to_f64(&reward));
                 return Err(Diagnostic::new("Q304", item.place, text).into());
             }
-            sum = sum.plus(&rounded(&reward).map_err(fault)?);
+            sum = sum_of_rewards(&sum, &rounded(&reward).map_err(fault)?);
         }
     }
     Ok(sum)

@@ -138,13 +138,13 @@ fn in_rationals<N: Number>(
 /// exactly 1. Returns `None` if an entry is not finite.
 fn stochastic<N: Number>(rows: &Rows<N>) -> Option<Rows<BigRational>> {
     let exact = |number: &N| BigRational::from_float(number.to_f64());
-    let all = |numbers: &[N]| numbers.iter().map(exact).collect::<Option<Vec<_>>>();
+    let exact_numbers = |numbers: &[N]| numbers.iter().map(exact).collect::<Option<Vec<_>>>();
     let mut result = Rows {
         first: rows.first.clone(),
         columns: rows.columns.clone(),
-        probabilities: all(&rows.probabilities)?,
-        constants: all(&rows.constants)?,
-        leaving: all(&rows.leaving)?,
+        probabilities: exact_numbers(&rows.probabilities)?,
+        constants: exact_numbers(&rows.constants)?,
+        leaving: exact_numbers(&rows.leaving)?,
     };
     for row in 0..result.len() {
         let range = result.range(row);
