@@ -1,6 +1,7 @@
 //! Stiff processes, in which the probability of leaving a set of states is tiny. In doubles, these
 //! processes have no inductive certificate, but state elimination has a small relative error.
 
+use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, Quantity, check};
@@ -218,8 +219,8 @@ fn random_model(states: &[Vec<RandomChoice>]) -> String {
                 1 => format!("{p}:(s'={first}) + 1-{p}:(s'={second})"),
                 _ => format!("{p}:(s'={first}) + {p}/3:(s'={second}) + 1-{p}-{p}/3:(s'={third})"),
             };
-            commands += &format!("[a{number}] s={state} -> {branches};\n");
-            rewards += &format!("[a{number}] s={state} : {reward} + {add}e-{small};\n");
+            let _ = writeln!(commands, "[a{number}] s={state} -> {branches};");
+            let _ = writeln!(rewards, "[a{number}] s={state} : {reward} + {add}e-{small};");
         }
     }
     format!(
