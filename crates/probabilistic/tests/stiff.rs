@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
-use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, Quantity, check};
+use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, Precision, Quantity, check};
 use metaplan_probabilistic::{prism, property};
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -19,8 +19,12 @@ fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
 }
 
 fn answer(model: &str, question: &str, exactness: Exactness) -> Answer {
+    answer_within(model, question, exactness, None)
+}
+
+fn answer_within(model: &str, question: &str, exactness: Exactness, precision: Option<Precision>) -> Answer {
     let model = prism::parse(model).unwrap_or_else(|problems| panic!("{problems:?}"));
-    let options = Options::default().with_exactness(exactness);
+    let options = Options::default().with_exactness(exactness).with_precision(precision);
     let start = Instant::now();
     let report = check(&model, &property::parse(question).expect("a property"), &options).expect("an answer");
     // Elimination takes milliseconds, whereas iteration would take up to an hour. The limit is
@@ -32,20 +36,27 @@ fn answer(model: &str, question: &str, exactness: Exactness) -> Answer {
     }
 }
 
-/// Checks that the bounds of an answer in doubles enclose the exact value. Returns this value, or `None` if it is
-/// infinite.
+/// Checks that the bounds of answers in doubles enclose the exact value, with and without a required precision.
+/// Returns this value, or `None` if it is infinite.
 fn enclosed(model: &str, question: &str) -> Option<BigRational> {
     let end = |end: f64| BigRational::from_float(end);
-    match (answer(model, question, Exactness::Always), answer(model, question, Exactness::Never)) {
-        (Answer::Finite(Quantity { exact: Some(exact), .. }), Answer::Finite(rounded)) => {
-            let is_below = end(rounded.lower).is_some_and(|lower| lower <= exact);
-            let is_above = end(rounded.upper).is_none_or(|upper| exact <= upper);
-            assert!(is_below && is_above, "{question}: {rounded:?}, exactly {exact}\n{model}");
-            Some(exact)
-        }
-        (Answer::Infinite, Answer::Infinite) => None,
+    let expected = match answer(model, question, Exactness::Always) {
+        Answer::Finite(quantity) => Some(quantity.exact.expect("a fraction")),
+        Answer::Infinite => None,
         other => panic!("{question}: {other:?}\n{model}"),
+    };
+    for precision in [None, Some(Precision::Relative(1e-13))] {
+        match (answer_within(model, question, Exactness::Never, precision), &expected) {
+            (Answer::Finite(rounded), Some(exact)) => {
+                let is_below = end(rounded.lower).is_some_and(|lower| lower <= *exact);
+                let is_above = end(rounded.upper).is_none_or(|upper| *exact <= upper);
+                assert!(is_below && is_above, "{question}: {rounded:?}, exactly {exact}\n{model}");
+            }
+            (Answer::Infinite, None) => {}
+            other => panic!("{question}: {other:?}\n{model}"),
+        }
     }
+    expected
 }
 
 fn agree(model: &str, question: &str, expected: &BigRational) {
