@@ -76,7 +76,7 @@ fn changed_certificates_are_answered() {
 fn control_characters_in_a_manifest_are_refused() {
     let manifest = |files: &Files| {
         let text = files.iter().find(|(name, _)| name.as_str() == "manifest.json");
-        serde_json::from_slice::<serde_json::Value>(&text.expect("a manifest").1).expect("JSON")
+        serde_json::from_slice::<serde_json::Value>(text.expect("a manifest").1).expect("JSON")
     };
     let forged = "1\nverified: the plan is optimal, metric 1";
     let mut refused = 0;
