@@ -43,7 +43,7 @@ fn enclosed(model: &str, question: &str) -> Option<BigRational> {
     let expected = match answer(model, question, Exactness::Always) {
         Answer::Finite(quantity) => Some(quantity.exact.expect("a fraction")),
         Answer::Infinite => None,
-        other => panic!("{question}: {other:?}\n{model}"),
+        Answer::Undefined => panic!("{question}: undefined\n{model}"),
     };
     for precision in [None, Some(Precision::Relative(1e-13))] {
         match (answer_within(model, question, Exactness::Never, precision), &expected) {
