@@ -121,7 +121,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let checked = CheckContext { arguments, model, listed, declarations, evaluate, progress: &progress };
     let mut answered = Vec::new();
     for combination in &value_combinations {
-        let reports = checked.check(combination).map_err(failed)?;
+        let reports = checked.check(combination).map_err(|error| combination.named_in(failed(error)))?;
         answered.push(CombinationResult { combination, reports });
     }
     progress.finish();

@@ -22,6 +22,18 @@ pub struct Combination {
     pub varied: Vec<(String, String)>,
 }
 
+impl Combination {
+    /// Adds the values of the constants with a series to the messages, because other values may have no error.
+    pub fn named_in(&self, failure: Failure) -> Failure {
+        if self.varied.is_empty() {
+            return failure;
+        }
+        let values: Vec<_> = self.varied.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        let help = format!("this is the model with {}", values.join(", "));
+        Failure { messages: failure.messages.map(|message| message.with_help(help.as_str())), ..failure }
+    }
+}
+
 pub type Row<'a> = (&'a Combination, &'a [Result<Report, Error>]);
 
 /// Returns all combinations of the values of the constants. The value of the last constant changes

@@ -65,6 +65,20 @@ fn constants_are_given_once() {
 }
 
 #[test]
+fn an_error_in_a_series_names_the_values_of_its_constants() {
+    let arguments = ["check", "-", "Pmax=? [ F s=1 ]", "--const", "n=1:3", "--const", "m=7"];
+    let model =
+        MODEL.replace("mdp\n", "mdp\nconst int n;\nconst int m;\n").replace("PROBABILITIES", "(s'=n)");
+    let outcome = metaplan_in(&root(), &arguments, &model);
+    assert_eq!(outcome.status, 3, "{outcome:#?}");
+    assert!(outcome.stderr.contains("Q305"), "{outcome:#?}");
+    assert!(
+        outcome.stderr.contains("this is the model with n=3") && !outcome.stderr.contains("m=7"),
+        "{outcome:#?}"
+    );
+}
+
+#[test]
 fn policies_are_written_and_evaluated() {
     let Some(folder) = data("reference/prism_cases") else { return };
     let model = folder.join("c12_det_plan_vs_policy.prism");

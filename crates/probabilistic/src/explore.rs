@@ -8,7 +8,7 @@ use std::hash::Hash;
 
 use crate::error::Error;
 use crate::fraction::Fraction;
-use crate::mdp::{MAX_COUNT, Mdp, dense};
+use crate::mdp::{MAX_COUNT, Mdp};
 use crate::number::Number;
 use crate::states::{Probe, States};
 
@@ -30,6 +30,14 @@ pub trait Generator<N: Number> {
 
     /// Returns the number of reward structures, i.e. the number of rewards per choice.
     fn rewards(&self) -> usize;
+
+    /// Returns the rewards of the loop that is added to a state without choices. By default, all are 0.
+    ///
+    /// # Errors
+    /// The model is invalid in this state, e.g. a reward is negative.
+    fn loop_rewards(&self, _state: &Self::State) -> Result<Vec<N>, Error> {
+        Ok(vec![N::zero(); self.rewards()])
+    }
 
     /// Returns the number of state codes if [`code`](Self::code) numbers all conceivable states,
     /// otherwise `None`. Up to 2^29 codes, states are indexed by a table instead of a hash map.
@@ -217,7 +225,7 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
                 }
             }
             batch.write(generator, &self.explored.states, begin..end)?;
-            self.explored.add(&mut batch, begin, limit)?;
+            self.explored.add(&mut batch, limit)?;
             self.next = end;
         }
     }
@@ -246,7 +254,13 @@ impl<S: Clone + Eq + Hash, N: Number> Batch<S, N> {
         self.choices.clear();
         self.ends.clear();
         for state in range {
+            let before = self.choices.ends.len();
             generator.successors(&states[state], &mut self.choices)?;
+            if self.choices.ends.len() == before {
+                let state = &states[state];
+                self.choices.to(state.clone(), N::one());
+                self.choices.end(DEADLOCK, generator.loop_rewards(state)?);
+            }
             self.ends.push(self.choices.ends.len());
         }
         self.probes.clear();
@@ -261,14 +275,14 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
         clippy::arithmetic_side_effects,
         reason = "no more deadlocks than states, which are counted by 32 bits, and positions in lists"
     )]
-    fn add(&mut self, batch: &mut Batch<S, N>, first: usize, limit: usize) -> Result<(), Error> {
+    fn add(&mut self, batch: &mut Batch<S, N>, limit: usize) -> Result<(), Error> {
         let Self { mdp, states, rewards, deadlocks, .. } = self;
         let too_many = |states: usize| Error::StateLimit { states, limit };
         let mut transitions = batch.choices.transitions.drain(..).zip(&batch.probes);
         let mut reward = batch.choices.rewards.drain(..);
         let mut choices = batch.choices.ends.drain(..);
         let (mut begin, mut finished_choices) = (0, 0);
-        for (at, end) in batch.ends.iter().enumerate() {
+        for end in &batch.ends {
             for (action, end) in choices.by_ref().take(end - finished_choices) {
                 for ((target, probability), probe) in transitions.by_ref().take(end - begin) {
                     let target = states.insert(target, *probe);
@@ -276,6 +290,7 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
                 }
                 begin = end;
                 mdp.end_choice(action)?;
+                *deadlocks += usize::from(action == DEADLOCK);
                 for values in &mut *rewards {
                     values.push(reward.next().unwrap_or_else(N::zero));
                 }
@@ -283,14 +298,6 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
             finished_choices = *end;
             if states.len() > limit {
                 return Err(too_many(states.len()));
-            }
-            if mdp.open_choices() == 0 {
-                *deadlocks += 1;
-                mdp.push_transition(dense(first + at), N::one());
-                mdp.end_choice(DEADLOCK)?;
-                for values in &mut *rewards {
-                    values.push(N::zero());
-                }
             }
             mdp.end_state();
         }

@@ -172,15 +172,6 @@ impl<N: Number> Mdp<N> {
         self.first_choice.push(dense(self.actions.len()));
     }
 
-    /// Returns the number of choices added since the last [`Self::end_state`].
-    #[expect(
-        clippy::arithmetic_side_effects,
-        reason = "the state that is being written starts after the choices of those before"
-    )]
-    pub fn open_choices(&self) -> usize {
-        self.actions.len() - self.first_choice[self.states()] as usize
-    }
-
     fn too_large(&self) -> Error {
         Error::StateLimit { states: self.states(), limit: self.states() }
     }

@@ -19,6 +19,17 @@ pub(crate) fn is_whole(value: f64) -> bool {
     value.fract() == 0.0 && value < WHOLE
 }
 
+/// Adds two rewards. In doubles, the sum is an integer only if both rewards are integers, because integers count as
+/// exact: instead of another integral sum, an adjacent double is returned.
+pub(crate) fn sum_of_rewards<N: Number>(left: &N, right: &N) -> N {
+    let sum = left.plus(right);
+    let [left, right, double] = [left, right, &sum].map(Number::to_f64);
+    if N::EXACT || !is_whole(double) || is_whole(left) && is_whole(right) {
+        return sum;
+    }
+    N::from_f64(double.next_up())
+}
+
 #[expect(
     clippy::cast_precision_loss,
     reason = "what is counted is in memory, so that there is less of it than 2^53"

@@ -129,6 +129,31 @@ fn nearly_integral_rewards_are_enclosed() {
     assert_eq!([whole.lower, whole.upper].map(f64::to_bits), [7.0, 7.0].map(f64::to_bits));
 }
 
+/// The doubles next to 1/2 are exact, and so is their sum, but not the sum of the rewards.
+#[test]
+fn rewards_with_an_integral_sum_in_doubles_are_enclosed() {
+    let half = "0.49999999999999999999";
+    let command = "dtmc module m s:[0..1] init 0; [a] s=0 -> (s'=1); endmodule";
+    for (question, rewards) in [
+        ("R=? [ F s=1 ]", format!("s=0 : 0.5; s=0 : {half};")),
+        ("R=? [ F s=1 ]", format!("s=0 : 0.5; [a] true : {half};")),
+        ("R=? [ I=0 ]", format!("s=0 : 0.5; s=0 : {half};")),
+    ] {
+        let module = "module n t:[0..1] init 0; endmodule";
+        for model in [
+            format!("{command} rewards {rewards} endrewards"),
+            format!("{command} {module} rewards {rewards} endrewards"),
+        ] {
+            enclosed(&model, question);
+        }
+    }
+    let cycle = format!(
+        "mdp module m s:[0..2] init 0; [a] s=0 -> (s'=1); [b] s=1 -> (s'=0); [c] s=1 -> (s'=2); endmodule
+         rewards [a] true : {half}; endrewards"
+    );
+    enclosed(&cycle, "Rmin=? [ F s=2 ]");
+}
+
 #[test]
 fn step_bounded_values_are_enclosed() {
     let model = "dtmc
@@ -141,6 +166,62 @@ fn step_bounded_values_are_enclosed() {
     // Exact arithmetic exceeds its budget, so the answer is in doubles.
     let rounded = value(model, "P=? [ F<=1000000 \"goal\" ]", Exactness::Auto);
     assert!(rounded.exact.is_none() && rounded.lower <= 1.0 && rounded.upper >= 1.0, "{rounded:?}");
+}
+
+#[test]
+fn rewards_without_a_step_are_enclosed() {
+    let model = "dtmc module m s:[0..1] init 0; [] true -> (s'=1-s); endmodule
+        rewards \"r\" s=0 : 2/3; s=0 : 1/7; s=1 : 3; endrewards
+        rewards \"whole\" s=0 : 2; s=0 : 3; endrewards";
+    for steps in [0, 1, 2] {
+        enclosed(model, &format!("R{{\"r\"}}=? [ I={steps} ]"));
+    }
+    let whole = value(model, "R{\"whole\"}=? [ I=0 ]", Exactness::Never);
+    assert_eq!([whole.lower, whole.upper].map(f64::to_bits), [5.0, 5.0].map(f64::to_bits));
+    let two_thirds = outcome(
+        &model.replace("s=0 : 1/7;", ""),
+        "R{\"r\"}<2/3 [ I=0 ]",
+        &Options::default().with_exactness(Exactness::Never),
+    );
+    assert!(matches!(two_thirds, Ok(Outcome::Undecided(_))), "{two_thirds:?}");
+}
+
+#[test]
+fn policies_start_in_all_initial_states() {
+    let model = "mdp
+        module m s:[0..5]; [a] s<5 -> 0.5:(s'=5) + 0.5:true; [b] s<5 -> 0.5:(s'=5) + 0.5:(s'=0); endmodule
+        init s=1 | s=3 endinit
+        label \"goal\" = s=5;";
+    let question = "Pmax=? [ F \"goal\" ]";
+    let parsed = prism::parse(model).expect("a model");
+    let property = property::parse(question).expect("a property");
+    let report = check(&parsed, &property, &Options::default().with_policy(true)).expect("an answer");
+    let table = report.policy.expect("a policy");
+    let mut listed: Vec<_> =
+        table.rows.iter().map(|row| row.values[0]).filter(|s| [1, 3].contains(s)).collect();
+    listed.sort_unstable();
+    assert_eq!(listed, [1, 3]);
+    let answer = outcome(model, question, &Options::default().with_evaluation(Some(table)));
+    let Ok(Outcome::Range(least, greatest)) = answer else { panic!("{answer:?}") };
+    for end in [least, greatest] {
+        assert_eq!(
+            end.quantity().and_then(|quantity| quantity.exact.clone()),
+            Some(BigRational::from_integer(1.into()))
+        );
+    }
+}
+
+#[test]
+fn a_policy_without_states_is_evaluated() {
+    let model = "mdp module m s:[0..1] init 0; [go] s=0 -> (s'=1); endmodule label \"goal\" = s=1;";
+    let policy = "{\"format\": \"metaplan-policy/1\", \"states\": []}";
+    for (question, expected) in [("Pmax=? [ F \"goal\" ]", "0"), ("Pmax=? [ F s=0 ]", "1")] {
+        let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
+        let answer =
+            outcome(model, question, &Options::default().with_evaluation(evaluate)).expect("an answer");
+        let Outcome::Value(Answer::Finite(answer)) = answer else { panic!("{answer:?}") };
+        assert_eq!(answer.exact.map(|exact| exact.to_string()).as_deref(), Some(expected), "{question}");
+    }
 }
 
 #[test]

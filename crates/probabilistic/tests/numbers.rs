@@ -126,6 +126,40 @@ fn step_bounds_are_integers_and_are_not_rounded() {
 }
 
 #[test]
+fn the_message_about_a_strict_step_bound_excludes_zero() {
+    let model = prism::parse(&counter_model("0..3", "0", "[] s<3 -> (s'=s+1);")).expect("a model");
+    for (bound, expected) in
+        [("<0", "at least 1 and at most 10^9 for `<`"), ("<=(-1)", "at least 0 and below 10^9")]
+    {
+        let property = property::parse(&format!("Pmax=? [ F {bound} s=3 ]")).expect("a property");
+        match check(&model, &property, &Options::default()) {
+            Err(Error::Property(problems)) => assert!(problems[0].message.contains(expected), "{problems:?}"),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn rational_logarithms_and_roots_are_exact() {
+    for (condition, expected) in [
+        ("log(1000,10)=3", "1"),
+        ("log(1/8,2)=-3", "1"),
+        ("log(1,7)=0", "1"),
+        ("log(1.21,1.1)=2", "1"),
+        ("log(1000,10)<3", "0"),
+        ("pow(8.0,1/3)=2", "1"),
+        ("pow(4/9,1.5)=8/27", "1"),
+        ("pow(4/9,-0.5)=3/2", "1"),
+        ("pow(2.0,0.5)>1.41421356 & pow(2.0,0.5)<1.41421357", "1"),
+        ("log(10,2)>3.3219280948 & log(10,2)<3.3219280949", "1"),
+        ("pow(0.0,0.5)=0", "1"),
+    ] {
+        let model = format!("dtmc module m s:[0..1] init 0; endmodule label \"l\" = {condition};");
+        assert_eq!(value_or_error(&model, "P=? [ F \"l\" ]"), expected, "{condition}");
+    }
+}
+
+#[test]
 fn a_policy_with_an_invalid_choice_is_rejected() {
     let model = prism::parse(&counter_model("0..3", "0", "[] s<3 -> (s'=s+1);")).expect("a model");
     let property = property::parse("Pmax=? [ F s=3 ]").expect("a property");

@@ -445,3 +445,61 @@ fn a_quotient_needs_a_value_only_in_the_states_of_the_question() {
     agree(model, "filter(max, 1/P=? [ F s=1 ], s<2)", "2");
     assert_eq!(error(model, "filter(max, 1/P=? [ F s=1 ], true)").0, "Q303");
 }
+
+#[test]
+fn a_state_without_a_choice_keeps_its_state_rewards() {
+    let model = "dtmc module m x:[0..1] init 1; endmodule
+        rewards \"r\" true : 1/7; [] true : 5; endrewards";
+    for (question, expected) in [
+        ("R{\"r\"}=? [ C<=2 ]", "2/7"),
+        ("R{\"r\"}=? [ S ]", "1/7"),
+        ("R{\"r\"}=? [ I=2 ]", "1/7"),
+        ("P=? [ F<=3 \"deadlock\" ]", "1"),
+    ] {
+        agree(model, question, expected);
+    }
+    let two_modules =
+        "mdp module m x:[0..1] init 0; [] x=0 -> (x'=1); endmodule module n y:[0..1] init 0; endmodule
+        rewards \"r\" x=1 : 1/7; [] true : 5; endrewards";
+    agree(two_modules, "R{\"r\"}max=? [ C<=3 ]", "37/7");
+    for exactness in [Exactness::Always, Exactness::Never] {
+        let total = outcome(model, "R{\"r\"}=? [ C ]", exactness);
+        assert!(matches!(total, Outcome::Value(Answer::Infinite)), "{total:?}");
+    }
+}
+
+/// Precedences of the manual of PRISM, strongest first: `|`, `<=>`, `=>`, `?`.
+#[test]
+fn equivalences_bind_more_tightly_than_implications() {
+    let text = |expression: &str| {
+        let model = format!(
+            "mdp const bool a; const bool b; const bool c; module m x:bool init {expression}; endmodule"
+        );
+        let model = prism::parse(&model).expect("a model");
+        let text = prism::write(&model);
+        assert_eq!(prism::write(&prism::parse(&text).expect("a model")), text, "{expression}");
+        text.split_once("init ")
+            .and_then(|(_, rest)| rest.split_once(';'))
+            .expect("an initial value")
+            .0
+            .to_owned()
+    };
+    for (expression, expected) in [
+        ("a => b <=> c", "a => b <=> c"),
+        ("a => (b <=> c)", "a => b <=> c"),
+        ("(a => b) <=> c", "(a => b) <=> c"),
+        ("a <=> b => c", "a <=> b => c"),
+        ("(a <=> b) => c", "a <=> b => c"),
+        ("a <=> (b => c)", "a <=> (b => c)"),
+        ("a => b => c", "a => b => c"),
+        ("a => (b => c)", "a => b => c"),
+        ("(a => b) => c", "(a => b) => c"),
+        ("a <=> b <=> c", "a <=> b <=> c"),
+        ("a <=> b | c", "a <=> b | c"),
+    ] {
+        assert_eq!(text(expression), expected, "{expression}");
+    }
+    let value = "dtmc module m x:[0..1] init 0; endmodule label \"l\" = false => false <=> false;";
+    agree(value, "P=? [ F<=0 \"l\" ]", "1");
+    agree(value, "P=? [ F<=0 (false => false <=> false) ]", "1");
+}

@@ -59,7 +59,8 @@ impl<'a> VerificationAnswer<'a> {
     }
 }
 
-/// Formats a line for each part and then the verdict. Control characters are made visible.
+/// Formats a line for each part and then the verdict. Control characters are made visible. Line breaks are escaped in
+/// each text of the certificate, which could otherwise imitate a line of this output.
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&text(self))
@@ -70,15 +71,15 @@ fn text(report: &Verification) -> String {
     let mut text = String::new();
     for part in &report.parts {
         let _ = match &part.result {
-            Ok(summary) => writeln!(text, "{:11} verified: {summary}", part.part),
-            Err(reason) => writeln!(text, "{:11} failed: {reason}", part.part),
+            Ok(summary) => writeln!(text, "{:11} verified: {}", part.part, one_line(summary)),
+            Err(reason) => writeln!(text, "{:11} failed: {}", part.part, one_line(reason)),
         };
     }
     let claim = match &report.claim {
-        Some(Claim::Optimal { metric }) => format!("the plan is optimal, metric {metric}"),
+        Some(Claim::Optimal { metric }) => format!("the plan is optimal, metric {}", one_line(metric)),
         Some(Claim::Unsolvable) => "there is no plan".to_owned(),
         Some(Claim::Front(front)) => {
-            let [first, second] = &front.objectives;
+            let [first, second] = front.objectives.each_ref().map(|objective| one_line(objective));
             let (count, ending) = (front.points.len(), if front.points.len() == 1 { "" } else { "s" });
             format!("the front of {first} and {second} has exactly {count} point{ending}")
         }
@@ -88,12 +89,17 @@ fn text(report: &Verification) -> String {
         (Some(subject), true) => writeln!(text, "verified: {claim}, for {}", extent(subject)),
         _ => writeln!(text, "NOT verified: {claim}"),
     };
-    visible(&text).into_owned()
+    text
+}
+
+/// Escapes line breaks, tabs, and the characters that [`visible`] escapes.
+fn one_line(text: &str) -> String {
+    visible(text).replace('\n', "\\n").replace('\t', "\\t")
 }
 
 fn extent(subject: &Subject) -> String {
     let checked = match (&subject.mission, subject.kind) {
-        (Some(name), _) => format!("the mission `{name}` with digest {:.12}", subject.digest),
+        (Some(name), _) => format!("the mission `{}` with digest {:.12}", one_line(name), subject.digest),
         (None, SubjectKind::Knowledge) => "these PDDL files and their knowledge base".to_owned(),
         (None, _) => "these PDDL files only".to_owned(),
     };
@@ -108,4 +114,36 @@ fn extent(subject: &Subject) -> String {
 /// Returns the [`VerificationAnswer`] of a verification as JSON text.
 pub fn json(report: &Verification) -> String {
     visible_json(&pretty(&VerificationAnswer::new(report))).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_of_a_certificate_do_not_imitate_lines() {
+        let forged = "1\nverified: the plan is optimal\tx\u{1b}[2J";
+        let mut report = Verification {
+            claim: Some(Claim::Optimal { metric: forged.to_owned() }),
+            subject: Some(Subject::new(&[], Some(forged))),
+            parts: vec![
+                VerifiedPart { part: "files", result: Ok(forged.to_owned()) },
+                VerifiedPart { part: "proof", result: Err(forged.to_owned()) },
+            ],
+        };
+        let escaped = "1\\nverified: the plan is optimal\\tx\\u{1b}[2J";
+        let expected = format!(
+            "files       verified: {escaped}\nproof       failed: {escaped}\nNOT verified: the plan is optimal, metric {escaped}\n"
+        );
+        assert_eq!(report.to_string(), expected);
+        report.parts.pop();
+        let objectives = [forged.to_owned(), "(cost)".to_owned()];
+        report.claim = Some(Claim::Front(crate::manifest::Front { objectives, points: Vec::new() }));
+        let text = report.to_string();
+        let verdict = format!(
+            "verified: the front of {escaped} and (cost) has exactly 0 points, for the mission `{escaped}` with digest "
+        );
+        assert!(text.lines().nth(1).is_some_and(|line| line.starts_with(&verdict)), "{text}");
+        assert_eq!(text.lines().count(), 2, "{text}");
+    }
 }

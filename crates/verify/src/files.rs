@@ -41,6 +41,15 @@ pub(crate) fn read(directory: &Path) -> Result<(Manifest, Contents), String> {
     if matches!(manifest.claim, Claim::Front(_)) {
         return Err(format!("{MANIFEST}: the certificate of a single plan cannot claim a front"));
     }
+    // These texts are printed. With a line break, they could imitate the result of a check.
+    let printed = match (&manifest.claim, &manifest.refutation) {
+        (Claim::Optimal { metric }, _) if metric.contains(char::is_control) => Some("metric"),
+        (_, Refutation::None(reason)) if reason.contains(char::is_control) => Some("refutation"),
+        _ => None,
+    };
+    if let Some(field) = printed {
+        return Err(format!("{MANIFEST}: `{field}` contains a control character"));
+    }
     let mut expected = vec![ARGUMENT, DOMAIN, PROBLEM, TASK, WITNESS];
     if manifest.claim != Claim::Unsolvable {
         expected.push(PLAN);

@@ -64,6 +64,9 @@ pub(crate) fn check(
     [Ok(summary), filled(knowledge, &origin, domain, problem)]
 }
 
+/// Code of the message about an import that is not found.
+const MISSING_IMPORT: &str = "O103";
+
 /// Returns `true` if a rule file equals the shipped rule file with this name.
 pub fn is_shipped(name: &str, text: &str) -> bool {
     [(COADAPTATION, rules::COADAPTATION_RULES), (TOMASYS, rules::TOMASYS_RULES)].contains(&(name, text))
@@ -71,10 +74,16 @@ pub fn is_shipped(name: &str, text: &str) -> bool {
 
 /// Describes for each rule file whether it is shipped, a changed version of a shipped file, or
 /// another file. Returns an error if the recorded digest of a rule file differs from that of its
-/// text, or if this file is missing.
+/// text, if this file is missing, or if its name contains a backquote or a control character.
 fn provenance(origin: &Origin) -> Result<String, String> {
     let mut descriptions = Vec::new();
     for (name, text) in &origin.rules {
+        // With a backquote, a name could imitate the description of another file.
+        if name.contains(|character: char| character == '`' || character.is_control()) {
+            return Err(format!(
+                "the name {name:?} of a rule file contains a backquote or a control character"
+            ));
+        }
         let sum = digest(text.as_bytes());
         let short = &sum[..12];
         if let Some(claimed) = origin.shipped.get(name)
@@ -123,8 +132,13 @@ pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     // Imports would refer to documents outside of the certificate, so they are not loaded.
     let options = ReadOptions { closed: true, ..ReadOptions::default() };
     let sources = Sources { documents, rules, options, ..Sources::default() };
-    let mut stated =
-        Stated::read_for(&sources, &origin.domain).map_err(|messages| first_message(&messages))?;
+    let mut stated = Stated::read_for(&sources, &origin.domain).map_err(|messages| {
+        // The message of the reader names options that the verifier does not have.
+        if messages.iter().any(|message| message.code == MISSING_IMPORT) {
+            return format!("{DOCUMENT}: contains owl:imports; a certificate may not import other documents");
+        }
+        first_message(&messages)
+    })?;
     for rule in &mut stated.program.rules {
         let file = sources.rules.iter().position(|file| **file == *rule.identity.source);
         if let Some(position) = file {
@@ -203,4 +217,44 @@ fn filled(
         "the problem follows from the knowledge{metric}; trusted without a check: {}",
         shared(&mission)
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn origin(rules: &[&str]) -> Origin {
+        let changes = serde_json::to_value(Statements::default()).expect("no statements");
+        let rules: Vec<_> = rules.iter().map(|name| (name, "")).collect();
+        let origin = serde_json::json!({
+            "domain": "(define (domain d))",
+            "problem": "(define (problem p) (:domain d))",
+            "bindings": {},
+            "rules": rules,
+            "shipped": {},
+            "changes": changes,
+        });
+        serde_json::from_value(origin).expect("an origin")
+    }
+
+    #[test]
+    fn names_of_rule_files_do_not_imitate_descriptions() {
+        let summary = provenance(&origin(&["mine.swrl", "folder/other rules.swrl"])).expect("harmless names");
+        assert!(summary.starts_with("rules: `mine.swrl` (not shipped, SHA-256 "), "{summary}");
+        for name in ["coadaptation` (shipped), `x", "a\nb.swrl", "a\u{1b}.swrl"] {
+            assert!(provenance(&origin(&[name])).is_err(), "{name:?}");
+        }
+    }
+
+    #[test]
+    fn a_certificate_may_not_import() {
+        let document = "<http://e.org/o> <http://www.w3.org/1999/02/22-rdf-syntax-ns#type> <http://www.w3.org/2002/07/owl#Ontology> .\n";
+        assert!(stated(document, &origin(&[])).is_ok());
+        let import = "<http://e.org/o> <http://www.w3.org/2002/07/owl#imports> <http://e.org/other> .\n";
+        let result = stated(&format!("{document}{import}"), &origin(&[])).map(|_| ());
+        assert_eq!(
+            result,
+            Err("knowledge.nt: contains owl:imports; a certificate may not import other documents".to_owned())
+        );
+    }
 }

@@ -73,6 +73,7 @@ impl<N: Number> Query<'_, N> {
         let mut vector = Vector::exactly(vec![N::zero(); n], Span::Probability);
         let mut error = 0.0_f64;
         let sweep = Sweep::new(&layers, problem, &earned);
+        let widest = layers.paid.iter().map(|choice| self.mdp().targets(*choice).len()).max().unwrap_or(0);
         for budget in 0..=budgets {
             // The oldest vector is no longer read, so its memory is reused.
             let mut values = if previous.len() > greatest { previous.remove(0) } else { vec![N::zero(); n] };
@@ -107,7 +108,7 @@ impl<N: Number> Query<'_, N> {
             let solution = within_budget(solve_within(layer, None, &mut self.work.borrow_mut()))?;
             let layer_error = solution.errors.iter().fold(0.0_f64, |most, error| most.max(*error));
             // The sums over the targets of choices with a reward cause rounding errors, too.
-            error += layer_error + 256.0 * f64::EPSILON;
+            error += layer_error + (256.0 + count(widest)) * f64::EPSILON;
             values = solution.values;
             values.truncate(n);
             previous.push(values);

@@ -354,8 +354,8 @@ fn required_rewards(
     Ok(required)
 }
 
-/// Lists the choice of a policy in each state that is reachable from the first initial state under
-/// the policy. States in which the policy has no choice are omitted.
+/// Lists the choice of a policy in each state that is reachable from an initial state under the
+/// policy. States in which the policy has no choice are omitted.
 fn policy_table<N: Number>(
     program: &Program<N>,
     explored: &Explored<Packed, N>,
@@ -364,8 +364,8 @@ fn policy_table<N: Number>(
     let names = program.variables.iter().map(|variable| (variable.name.clone(), variable.is_bool)).collect();
     let mut table = PolicyTable { variables: names, rows: Vec::new() };
     let mut visited = vec![false; explored.mdp.states()];
-    let mut queue = VecDeque::from([0_usize]);
-    visited[0] = true;
+    let mut queue: VecDeque<usize> = (0..explored.starts).collect();
+    visited[..explored.starts].fill(true);
     let mut values = Vec::new();
     while let Some(state) = queue.pop_front() {
         let choice = policy[state];

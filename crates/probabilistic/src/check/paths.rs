@@ -5,9 +5,9 @@ use num_traits::ToPrimitive;
 
 use crate::check::ask::{Checked, property_error, refusal, within_budget};
 use crate::check::query::Query;
-use crate::check::steps;
+use crate::check::steps::{self, Stepped};
 use crate::check::vector::{Span, Vector};
-use crate::number::Number;
+use crate::number::{Number, count, is_whole};
 use crate::policy::with_secondary;
 use crate::prism::ast::{ModelKind, Path, RewardPath, StepBound, Steps};
 use crate::solve::{Direction, Problem, Solution, draft, solve_within};
@@ -112,16 +112,18 @@ impl<N: Number> Query<'_, N> {
         let (no_states, outside) = (FixedBitSet::with_capacity(left.len()), inverse(left.clone()));
         let before = Problem { blocked: Some(&outside), ..self.problem(direction, None, &no_states) };
         let errors = then.errors;
-        let mut values = self.stepped(before, then.values, 1)?.values;
+        let Stepped { mut values, relative, lost } = self.stepped(before, then.values, 1)?;
         for state in outside.ones() {
             values[state] = N::zero();
         }
-        let stepped = self.stepped(before, values, least.saturating_sub(1))?;
+        let mut stepped = self.stepped(before, values, least.saturating_sub(1))?;
+        // The step that was computed separately rounds, too. Its error is not yet counted.
+        stepped.relative += relative;
+        stepped.lost |= lost;
         let mut vector = Vector::stepped(stepped, Span::Probability);
         let first = errors.iter().fold(0.0_f64, |most, error| most.max(*error));
-        for (error, value) in vector.errors.iter_mut().zip(&vector.values) {
-            // The step that was computed separately rounds, too. Its error is not yet counted.
-            *error += first + 64.0 * f64::EPSILON * value.to_f64();
+        for error in &mut vector.errors {
+            *error += first;
         }
         Ok(vector.into())
     }
@@ -150,7 +152,11 @@ impl<N: Number> Query<'_, N> {
         // `validate` has checked that the bound is an integer.
         let limit = self.constant(&bound.limit)?.to_integer() + offset;
         Ok(limit.to_u32().filter(|most| *most < MAX_STEPS).ok_or_else(|| {
-            let text = "the number of steps must be at least 0 and below 10^9";
+            let text = if offset < 0 {
+                "the number of steps must be at least 1 and at most 10^9 for `<`"
+            } else {
+                "the number of steps must be at least 0 and below 10^9"
+            };
             property_error("Q503", bound.limit.place, text)
         })?)
     }
@@ -172,7 +178,12 @@ impl<N: Number> Query<'_, N> {
             RewardPath::Instant(limit) => {
                 let limit = self.at_most(&StepBound { limit: limit.clone(), strict: false })?;
                 let values = self.state_rewards(name)?;
-                let stepped = self.stepped(self.problem(direction, None, &no_states), values, limit)?;
+                // A sum of rewards is exact if it is an integer. Otherwise, each reward and each addition is rounded.
+                let is_exact = N::EXACT || values.iter().all(|value| is_whole(value.to_f64()));
+                let mut stepped = self.stepped(self.problem(direction, None, &no_states), values, limit)?;
+                if !is_exact {
+                    stepped.relative += (count(self.state_reward_count(name)?) + 1.0) * f64::EPSILON;
+                }
                 Ok(Vector::stepped(stepped, Span::Positive).into())
             }
             RewardPath::Total => self.total(direction, self.rewards(name)?),
@@ -185,7 +196,7 @@ impl<N: Number> Query<'_, N> {
 
     /// Applies the Bellman operator `steps` times to `values`, the values after the last step. If a policy is
     /// given, only its choices are considered.
-    fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Checked<steps::Stepped<N>> {
+    fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Checked<Stepped<N>> {
         let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };
         within_budget(steps::apply(problem, values, steps, &mut self.work.borrow_mut()))
     }

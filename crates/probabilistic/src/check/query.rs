@@ -80,6 +80,12 @@ impl<'a, N: Number> Query<'a, N> {
         Ok(&self.explored.rewards[at])
     }
 
+    /// Returns the number of items of a structure that define state rewards.
+    pub fn state_reward_count(&self, name: Option<&str>) -> Result<usize, Error> {
+        let number = structure(&self.program.reward_names, name)?;
+        Ok(self.program.state_reward_count(number))
+    }
+
     /// Returns the state rewards of a structure by state, without the transition rewards.
     pub fn state_rewards(&self, name: Option<&str>) -> Checked<Vec<N>> {
         let number = structure(&self.program.reward_names, name)?;

@@ -98,13 +98,17 @@ impl PolicyTable {
         program: &Program<N>,
         explored: &Explored<Packed, N>,
     ) -> Result<Vec<u32>, Error> {
+        let mut policy = vec![NONE; explored.mdp.states()];
+        // The rows define the variables, so a table without rows has none.
+        if self.rows.is_empty() {
+            return Ok(policy);
+        }
         let mut order = Vec::new();
         for variable in &program.variables {
             let position = self.variables.iter().position(|(name, _)| *name == variable.name);
             let missing = || Error::Policy(format!("the policy has no variable `{}`", variable.name));
             order.push(position.ok_or_else(missing)?);
         }
-        let mut policy = vec![NONE; explored.mdp.states()];
         for (number, row) in self.rows.iter().enumerate() {
             let problem = |description: &str| Error::Policy(numbered(number, description));
             let values: Vec<i64> = order.iter().map(|at| row.values[*at]).collect();

@@ -204,8 +204,8 @@ impl BinaryOp {
     /// Returns the symbol and the precedence; operators with a greater precedence bind more tightly.
     pub fn sign(self) -> (&'static str, u8) {
         match self {
-            Self::Iff => ("<=>", 2),
-            Self::Implies => ("=>", 3),
+            Self::Implies => ("=>", 2),
+            Self::Iff => ("<=>", 3),
             Self::Or => ("|", 4),
             Self::And => ("&", 5),
             Self::Equal => ("=", 7),

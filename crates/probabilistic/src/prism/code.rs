@@ -1,11 +1,12 @@
 //! Typed expressions with resolved names, and their evaluation.
 //!
 //! Arithmetic is exact, so that `1 - 0.7 - 0.3` is zero even if the model is solved in doubles.
-//! Only logarithms, powers with fractional exponents and very large powers are approximated.
+//! Only irrational logarithms and powers, and very large powers, are approximated by doubles. The same holds for
+//! rational logarithms that are no integers.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
-use num_traits::{ToPrimitive, Zero};
+use num_traits::{Signed, ToPrimitive, Zero};
 
 use crate::number::Number;
 use crate::prism::ast::{BinaryOp, Function, Type};
@@ -40,6 +41,9 @@ type Result<T> = std::result::Result<T, Fault>;
 /// Upper limit in bits on the total size of both operands of an arithmetic operation, and on the estimated
 /// size of a power that is computed exactly.
 const MAX_OPERAND_BITS: u64 = 100_000;
+
+/// Upper limit on the degree of a root that is computed exactly.
+const MAX_ROOT: u32 = 1000;
 
 const OVERFLOW: Fault = Fault("an integer exceeds its range");
 
@@ -110,8 +114,8 @@ impl Code {
         })
     }
 
-    /// Evaluates a numeric expression. The result is exact, except for logarithms, powers with
-    /// fractional exponents and very large powers.
+    /// Evaluates a numeric expression. The result is exact, except for logarithms that are no integers,
+    /// irrational powers and very large powers.
     pub fn number(&self, values: &[i64]) -> Result<BigRational> {
         Ok(match self {
             Self::Number(value) => value.clone(),
@@ -272,15 +276,43 @@ fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result
                 {
                     Ok(base.pow(whole))
                 }
-                // Other exponents and powers beyond the size limit: the power is approximated in doubles.
+                // Irrational powers and powers beyond the size limit are approximated in doubles.
+                _ if let Some(power) = rational_power(&base, &exponent) => Ok(power),
                 _ => irrational(Number::to_f64(&base).powf(Number::to_f64(&exponent))),
             }
         }
-        Function::Log => irrational(Number::to_f64(&number(0)?).log(Number::to_f64(&number(1)?))),
+        Function::Log => {
+            let (argument, base) = (number(0)?, number(1)?);
+            let approximation = Number::to_f64(&argument).log(Number::to_f64(&base));
+            whole_logarithm(&argument, &base, approximation)
+                .map_or_else(|| irrational(approximation), |exact| Ok(BigRational::from(BigInt::from(exact))))
+        }
         Function::Floor | Function::Ceil | Function::Round | Function::Mod => {
             whole_call(function, arguments, values).map(from_whole)
         }
     }
+}
+
+/// Returns a power whose exponent is a fraction, if the power is rational. Returns `None` for other powers, and for
+/// operands beyond the size limits.
+fn rational_power(base: &BigRational, exponent: &BigRational) -> Option<BigRational> {
+    let degree = exponent.denom().to_u32().filter(|degree| *degree <= MAX_ROOT)?;
+    if !base.is_positive() || base.size() > MAX_OPERAND_BITS {
+        return None;
+    }
+    let root = BigRational::new_raw(base.numer().nth_root(degree), base.denom().nth_root(degree));
+    let times = exponent.numer().to_i32()?;
+    let is_small = root.size().saturating_mul(times.unsigned_abs().into()) <= MAX_OPERAND_BITS;
+    (is_small && root.pow(degree.to_i32()?) == *base).then(|| root.pow(times))
+}
+
+/// Returns the logarithm of `argument` to `base` if it is an integer. Otherwise, and for operands beyond the size
+/// limit, returns `None`.
+fn whole_logarithm(argument: &BigRational, base: &BigRational, approximation: f64) -> Option<i32> {
+    let whole = approximation.round().to_i32()?;
+    let is_small =
+        base.is_positive() && base.size().saturating_mul(whole.unsigned_abs().into()) <= MAX_OPERAND_BITS;
+    (is_small && base.pow(whole) == *argument).then_some(whole)
 }
 
 fn irrational(value: f64) -> Result<BigRational> {

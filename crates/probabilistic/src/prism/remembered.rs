@@ -15,7 +15,7 @@ use smallvec::SmallVec;
 use crate::error::Error;
 use crate::explore::{Choices, Generator};
 use crate::mdp::dense;
-use crate::number::Number;
+use crate::number::{Number, sum_of_rewards};
 use crate::prism::ast::ModelKind;
 use crate::prism::behaviour::{Chosen, MAX_ACTIONS, Module};
 use crate::prism::command::RewardItem;
@@ -88,6 +88,10 @@ impl<N: Number> Generator<N> for Remembered<'_, N> {
 
     fn rewards(&self) -> usize {
         Generator::rewards(self.program)
+    }
+
+    fn loop_rewards(&self, state: &Packed) -> Result<Vec<N>, Error> {
+        self.program.loop_rewards(state)
     }
 
     fn codes(&self) -> Option<usize> {
@@ -165,7 +169,7 @@ impl<N: Number> Memory<N> {
             team.each_combination(parts, |chosen| {
                 combiner
                     .combine(team, state, parts, chosen, |next, probability| choices.to(next, probability));
-                choices.end(action, sums_of_state.iter().zip(action_sums).map(|(a, b)| a.plus(b)));
+                choices.end(action, sums_of_state.iter().zip(action_sums).map(|(a, b)| sum_of_rewards(a, b)));
             })
         })
     }
@@ -197,7 +201,7 @@ impl<N: Number> Memory<N> {
             let reward = action_sums_cache.get(program, action, state)?;
             team.each_combination(parts, |chosen| {
                 for (sum, reward) in total.iter_mut().zip(reward) {
-                    *sum = sum.plus(&share(reward));
+                    *sum = sum_of_rewards(sum, &share(reward));
                 }
                 combiner.combine(team, state, parts, chosen, |next, probability| {
                     choices.to(next, share(&probability));

@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 use crate::error::{Diagnostic, Error, Place};
 use crate::explore::{Choices, Generator};
 use crate::mdp::dense;
-use crate::number::Number;
+use crate::number::{Number, sum_of_rewards};
 use crate::prism::ast::ModelKind;
 use crate::prism::code::{Code, Fault, rounded};
 use crate::prism::command::{Command, RewardItem, Variable};
@@ -231,6 +231,11 @@ impl<N: Number> Program<N> {
         sum(&self.rewards[structure].states, values)
     }
 
+    /// Returns the number of items of a reward structure that define state rewards.
+    pub(crate) fn state_reward_count(&self, structure: usize) -> usize {
+        self.rewards[structure].states.len()
+    }
+
     pub(super) fn state_rewards(&self, values: &[i64]) -> Result<Sums<N>, Error> {
         self.computed_rewards.iter().map(|structure| sum(&self.rewards[*structure].states, values)).collect()
     }
@@ -292,7 +297,8 @@ impl<N: Number> Program<N> {
     ) -> Result<(), Error> {
         let state_sums = self.state_rewards(values)?;
         let rewards = |action_sums: &Sums<N>| {
-            let sums: Sums<N> = state_sums.iter().zip(action_sums).map(|(a, b)| a.plus(b)).collect();
+            let sums: Sums<N> =
+                state_sums.iter().zip(action_sums).map(|(a, b)| sum_of_rewards(a, b)).collect();
             sums
         };
         for group in &self.free {
@@ -356,7 +362,7 @@ impl<N: Number> Program<N> {
             let rewards = self.action_rewards(joint.action, values)?;
             joint.each(|chosen| {
                 for (sum, reward) in total.iter_mut().zip(&rewards) {
-                    *sum = sum.plus(&share(reward));
+                    *sum = sum_of_rewards(sum, &share(reward));
                 }
                 self.expand(state, joint, chosen, |next, probability| choices.to(next, share(&probability)));
                 Ok::<(), Error>(())
@@ -380,6 +386,11 @@ impl<N: Number> Generator<N> for Program<N> {
 
     fn rewards(&self) -> usize {
         self.computed_rewards.len()
+    }
+
+    /// Returns the state rewards: the added loop has no action, and therefore no transition rewards.
+    fn loop_rewards(&self, state: &Packed) -> Result<Vec<N>, Error> {
+        Ok(self.state_rewards(&self.values_of(state))?.into_vec())
     }
 
     fn codes(&self) -> Option<usize> {
@@ -415,7 +426,7 @@ fn sum<N: Number>(items: &[RewardItem<N>], values: &[i64]) -> Result<N, Error> {
         let fault = |fault| at(fault, item.place);
         if item.guard.holds(values).map_err(fault)? {
             if let Some(reward) = &item.certain {
-                sum = sum.plus(reward);
+                sum = sum_of_rewards(&sum, reward);
                 continue;
             }
             let reward = item.reward.number(values).map_err(fault)?;
@@ -423,7 +434,7 @@ fn sum<N: Number>(items: &[RewardItem<N>], values: &[i64]) -> Result<N, Error> {
                 let text = format!("a negative reward, {}", Number::to_f64(&reward));
                 return Err(Diagnostic::new("Q304", item.place, text).into());
             }
-            sum = sum.plus(&rounded(&reward).map_err(fault)?);
+            sum = sum_of_rewards(&sum, &rounded(&reward).map_err(fault)?);
         }
     }
     Ok(sum)

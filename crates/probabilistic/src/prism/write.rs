@@ -6,7 +6,7 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Signed};
 
-use crate::prism::ast::{Expr, ExprKind, Model, ModelKind, Variable};
+use crate::prism::ast::{BinaryOp, Expr, ExprKind, Model, ModelKind, Variable};
 use crate::prism::reserved::is_reserved;
 
 /// Formats a model as text that PRISM and Storm can parse.
@@ -109,8 +109,13 @@ fn operand(expression: &Expr, least: u8) -> String {
         ExprKind::Binary(op, left, right) => {
             let (sign, strength) = op.sign();
             let space = if strength <= 4 { " " } else { "" };
-            let left = operand(left, strength);
-            (format!("{left}{space}{sign}{space}{}", operand(right, strength + 1)), strength)
+            // `=>` is right-associative, everything else left-associative.
+            let (least_left, least_right) = match op {
+                BinaryOp::Implies => (strength + 1, strength),
+                _ => (strength, strength + 1),
+            };
+            let (left, right) = (operand(left, least_left), operand(right, least_right));
+            (format!("{left}{space}{sign}{space}{right}"), strength)
         }
         ExprKind::If(condition, then, otherwise) => {
             let condition = operand(condition, 2);

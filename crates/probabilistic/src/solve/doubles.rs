@@ -97,34 +97,66 @@ fn is_tight<N: Number>(values: &[N], errors: &[f64], tight: f64) -> bool {
     values.iter().zip(errors).all(|(value, error)| value.is_zero() || *error <= tight * 0.5 * value.to_f64())
 }
 
-/// Solves the equations exactly in rationals, although their entries are rounded. The error bound accounts for
-/// this rounding: a value contains a few rounding errors per block (merged end component), in its numerator and
-/// in its denominator (see `chain`). Returns `None` if the budget is exceeded or an entry is not finite.
+/// Solves the equations in rationals, although their entries are rounded. Returns `None` if the budget is
+/// exceeded or an entry is not finite.
+///
+/// Each row is first divided by the sum of its probabilities (see [`stochastic`]). Otherwise, the pivots of
+/// elimination, which are sums of probabilities of leaving, would contradict the diagonal of the equations by
+/// the rounding error of this sum. Values of about 10^16 steps multiply this error, so that policy
+/// iteration would stop at a wrong policy or alternate between policies.
+///
+/// With u = ε/2, the error bound is as follows, up to factors near 1:
+///
+/// - Let w be the greatest number of transitions of a choice. An entry of a rounded row has a relative error of
+///   at most (w + 3)ε: the probability itself is rounded (ε), merging adds up to w of them (wu), and the
+///   division by the probability of not looping adds as much again. The division by the sum doubles this
+///   error for probabilities. Constants are not divided.
+/// - The value of a policy is N/D, where N and D are sums of products of n probabilities at most (see `chain`);
+///   each term of N has a constant in place of one of them. Hence the relative error is at most 4n(w + 3)ε.
+/// - The rows have the same transitions before and after rounding, so the same policies leave the component. As
+///   the bound holds for the value of each of them, it holds for the optimum, too.
 fn in_rationals<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],
     direction: Direction,
     work: &mut Work,
 ) -> Option<Enclosed<N>> {
-    let exact = |numbers: &[N]| {
-        numbers.iter().map(|number| BigRational::from_float(number.to_f64())).collect::<Option<Vec<_>>>()
-    };
-    let rows = &quotient.rows;
     let rational = Quotient {
         first: quotient.first.clone(),
-        rows: Rows {
-            first: rows.first.clone(),
-            columns: rows.columns.clone(),
-            probabilities: exact(&rows.probabilities)?,
-            constants: exact(&rows.constants)?,
-            leaving: exact(&rows.leaving)?,
-        },
+        rows: stochastic(&quotient.rows)?,
         choices: quotient.choices.clone(),
         widest: quotient.widest,
     };
     let optimum = iterate(&rational, policy.to_vec(), direction, work)?;
-    let relative = (count(quotient.blocks()) + 4.0) * 2.0 * (count(quotient.widest) + 8.0) * f64::EPSILON;
+    let relative = 4.0 * (count(quotient.blocks()) + 4.0) * (count(quotient.widest) + 8.0) * f64::EPSILON;
     let values: Vec<N> = optimum.values.iter().map(N::from_rational).collect();
     let errors = values.iter().map(|value| value.to_f64() * relative).collect();
     Some(Enclosed { policy: optimum.policy, values, errors })
+}
+
+/// Converts rows to rationals and divides the probabilities of each row by their sum, so that this sum is
+/// exactly 1. Returns `None` if an entry is not finite.
+fn stochastic<N: Number>(rows: &Rows<N>) -> Option<Rows<BigRational>> {
+    let exact = |number: &N| BigRational::from_float(number.to_f64());
+    let exact_numbers = |numbers: &[N]| numbers.iter().map(exact).collect::<Option<Vec<_>>>();
+    let mut result = Rows {
+        first: rows.first.clone(),
+        columns: rows.columns.clone(),
+        probabilities: exact_numbers(&rows.probabilities)?,
+        constants: exact_numbers(&rows.constants)?,
+        leaving: exact_numbers(&rows.leaving)?,
+    };
+    for row in 0..result.len() {
+        let range = result.range(row);
+        let sum = result.probabilities[range.clone()]
+            .iter()
+            .fold(result.leaving[row].clone(), |sum, p| sum.plus(p));
+        if !sum.is_unit() {
+            let probabilities = result.probabilities[range].iter_mut();
+            for probability in probabilities.chain([&mut result.leaving[row]]) {
+                *probability = probability.over(&sum);
+            }
+        }
+    }
+    Some(result)
 }

@@ -13,9 +13,11 @@ use crate::solve::users::{Users, owners};
 use crate::solve::work::Work;
 
 /// Upper limit on the number of rounds of policy iteration in doubles. If it is reached, the last policy may not be
-/// optimal; its error is bounded afterwards. In exact arithmetic, the budget is the only limit, because the result counts
-/// as optimal.
+/// optimal; its error is bounded afterwards.
 const MAX_ROUNDS: usize = 1000;
+/// Upper limit on the number of rounds in exact arithmetic. If it is reached, there is no result, because a
+/// result counts as optimal. Usually, the budget of work is exceeded much earlier.
+const MAX_EXACT_ROUNDS: usize = 1_000_000;
 /// Least and greatest number of sweeps that improve the policy before its chain is solved again. Only for large
 /// components in doubles; otherwise there is one sweep.
 const SWEEPS: (u64, u64) = (2, 40);
@@ -37,7 +39,7 @@ pub struct Iterated<N> {
 
 /// Performs policy iteration from the policy `start`, which must lead from every block (merged end
 /// component) out of the component with probability 1. Returns `None` if the chain of a policy
-/// cannot be solved within the limits, or if exact arithmetic exceeds its budget.
+/// cannot be solved within the limits, or if exact arithmetic exceeds its budget or [`MAX_EXACT_ROUNDS`].
 pub fn iterate<N: Number>(
     quotient: &Quotient<N>,
     start: Vec<u32>,
@@ -48,7 +50,7 @@ pub fn iterate<N: Number>(
     let mut touched = work.touched();
     let Solved { mut values, mut relative } = chain(quotient, &policy, work)?;
     let large = !N::EXACT && quotient.blocks() >= SWEEP_MIN_BLOCKS;
-    let rounds = if N::EXACT { usize::MAX } else { MAX_ROUNDS };
+    let (rounds, mut is_stable) = (if N::EXACT { MAX_EXACT_ROUNDS } else { MAX_ROUNDS }, false);
     for _ in 0..rounds {
         let mut improved = false;
         // The sweeps may take about as long as the last elimination. Without fill-in, elimination is fast, so
@@ -64,12 +66,13 @@ pub fn iterate<N: Number>(
             }
         }
         if !improved {
+            is_stable = true;
             break;
         }
         touched = work.touched();
         Solved { values, relative } = chain(quotient, &policy, work)?;
     }
-    Some(Iterated { policy, values, relative })
+    (is_stable || !N::EXACT).then_some(Iterated { policy, values, relative })
 }
 
 fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32], work: &mut Work) -> Option<Solved<N>> {

@@ -251,7 +251,10 @@ impl<N: Number> PathBuffers<N> {
         self.settled.resize(states, false);
         (self.error, self.zero_error) = (0.0, 0.0);
         // A path has fewer than `MAX_STATES` steps, so the sum of its costs is an exact integer.
-        let whole = |step: &Step<N>| !step.divided && is_whole(step.cost.to_f64() * count(MAX_STATES));
+        let whole = |step: &Step<N>| {
+            let cost = step.cost.to_f64();
+            !step.divided && is_whole(cost) && is_whole(cost * count(MAX_STATES))
+        };
         self.whole = !N::EXACT && self.steps.iter().all(whole);
     }
 

@@ -73,6 +73,32 @@ fn changed_certificates_are_answered() {
 }
 
 #[test]
+fn control_characters_in_a_manifest_are_refused() {
+    let manifest = |files: &Files| {
+        let text = files.iter().find(|(name, _)| name.as_str() == "manifest.json");
+        serde_json::from_slice::<serde_json::Value>(text.expect("a manifest").1).expect("JSON")
+    };
+    let forged = "1\nverified: the plan is optimal, metric 1";
+    let mut refused = 0;
+    for files in originals() {
+        let mut manifests = [manifest(&files), manifest(&files)];
+        let fields = ["/claim/optimal/metric", "/refutation/none"];
+        for (changed, field) in manifests.iter_mut().zip(fields) {
+            let Some(value) = changed.pointer_mut(field) else { continue };
+            *value = forged.into();
+            let directory = tempfile::tempdir().expect("a directory");
+            write(directory.path(), &files);
+            std::fs::write(directory.path().join("manifest.json"), changed.to_string()).expect("a manifest");
+            let text = Verifier::new(directory.path()).verify().to_string();
+            assert!(text.contains("contains a control character"), "{text}");
+            assert!(!text.contains("\nverified"), "{text}");
+            refused += 1;
+        }
+    }
+    assert!(refused >= 3, "{refused} manifests have such fields");
+}
+
+#[test]
 #[ignore = "minutes"]
 fn many_changed_certificates_are_answered() {
     withstand(1_000..6_000);
