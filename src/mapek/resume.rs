@@ -281,7 +281,9 @@ fn waive_start_conditions(action: &mut Action) {
 
 fn waive(condition: &mut Condition, predicates: &BTreeSet<Name>) {
     if let Condition::And(parts) = condition {
-        parts.iter_mut().for_each(|part| waive(part, predicates));
+        for part in parts {
+            waive(part, predicates);
+        }
         return;
     }
     let (mut is_about, mut is_numeric) = (false, false);
