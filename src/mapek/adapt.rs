@@ -68,7 +68,8 @@ impl Adaptation<'_> {
     fn decide(&mut self, mut changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
         self.record_improvement_causes(&findings, &changes);
         // Lost designs do not count: with fewer alternatives, a missing plan stays missing.
-        let is_change = changes.facts || !changes.reasons.is_empty() || !findings.gained.is_empty();
+        let is_change =
+            changes.facts || changes.ended || !changes.reasons.is_empty() || !findings.gained.is_empty();
         if self.stop_after_failures(&changes, answers) {
             return;
         }
@@ -228,6 +229,7 @@ impl Adaptation<'_> {
         self.beliefs.stuck = false;
         if self.is_current(steps) {
             self.beliefs.unproved = !outcome.proved;
+            self.update_costs(steps);
             let because =
                 if outcome.proved { "it is still the best" } else { "no better one was found in time" };
             answers.push(Answer::PlanKept { because: because.to_owned() });
@@ -335,6 +337,16 @@ impl Adaptation<'_> {
         running.chain(plan).map(key).eq(steps.iter().map(key))
     }
 
+    /// Sets the durations and costs of the current plan, without the action under way, to those of `steps`, which are
+    /// the same plan in the present situation.
+    fn update_costs(&mut self, steps: &[PlannedStep]) {
+        let present = steps.iter().skip(usize::from(self.beliefs.running.is_some()));
+        for (step, present) in self.beliefs.plan.iter_mut().flatten().zip(present) {
+            step.duration.clone_from(&present.duration);
+            step.cost.clone_from(&present.cost);
+        }
+    }
+
     /// Returns the reason to keep the current plan, or `None` if the benefit of `outcome` is sufficient or the metric
     /// of the current plan is undefined.
     fn insufficient_benefit(&self, outcome: &Outcome) -> Option<String> {
@@ -372,12 +384,15 @@ impl Adaptation<'_> {
     }
 
     fn report_no_plan(&mut self, is_necessary: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
+        if !is_necessary {
+            let because = format!("no better one was found: {}", outcome.because);
+            answers.push(Answer::PlanKept { because });
+            return;
+        }
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
         answers.push(Answer::PlanNone { status, because: outcome.because, blocking: outcome.blocking });
-        if is_necessary {
-            self.beliefs.plan = None;
-            self.beliefs.stuck = true;
-        }
+        self.beliefs.plan = None;
+        self.beliefs.stuck = true;
     }
 }
 

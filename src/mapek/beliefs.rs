@@ -11,13 +11,13 @@ use std::time::Duration;
 
 use num_rational::BigRational;
 use pddl::ast::{ActionBody, Domain, Problem};
-use pddl::validate::{Options, PlanText, Violation, advance, metric_of, validate};
+use pddl::validate::{Options, PlanText, Violation, advance, advance_each, metric_of, validate};
 
 use crate::knowledge::Fault;
 use crate::mapek::answer::{Command, Effect};
 use crate::mapek::filter::FilterStates;
 use crate::mapek::receipts::Receipts;
-use crate::mapek::resume::{resume, resumed_goal};
+use crate::mapek::resume::{Remainder, resume, resumed_goal, without_companions};
 use crate::mapek::sequence::Numbers;
 use crate::mapek::step::{PlannedStep, plan_text};
 use crate::mission::Mission;
@@ -86,6 +86,13 @@ pub(super) struct Running {
     pub(super) progressed: bool,
     pub(super) resumed: bool,
     pub(super) sent_configuration: Vec<(String, String)>,
+}
+
+impl Running {
+    pub(super) fn remainder(&self) -> Remainder<'_> {
+        let Self { step, progress, applied, started, .. } = self;
+        Remainder { step, progress, applied, has_started: *started }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -206,8 +213,8 @@ impl Beliefs {
         self.running.as_ref().map(|running| (running.action, &running.step))
     }
 
-    pub(crate) fn progress(&self) -> Option<&BigRational> {
-        self.running.as_ref().map(|running| &running.progress)
+    pub(crate) fn remainder(&self) -> Option<Remainder<'_>> {
+        self.running.as_ref().map(Running::remainder)
     }
 
     /// Returns `true` if the action under way is being cancelled.
@@ -285,10 +292,11 @@ impl Beliefs {
     /// with its remainder.
     fn remaining_mission(&self) -> (Cow<'_, Domain>, Problem) {
         let (domain, mut problem) = (self.mission.domain(), Arc::unwrap_or_clone(self.filled()));
-        match &self.running {
-            Some(running) => {
+        match self.remainder() {
+            Some(remainder) => {
                 problem.goal = resumed_goal(&problem.goal);
-                (Cow::Owned(resume(domain, &running.step, &running.progress)), problem)
+                let (domain, problem) = resume(domain, Cow::Owned(problem), &remainder);
+                (Cow::Owned(domain), problem.into_owned())
             }
             None => (Cow::Borrowed(domain), problem),
         }
@@ -297,6 +305,19 @@ impl Beliefs {
     pub(super) fn remaining_plan(&self) -> PlanText {
         let running = self.running.iter().map(|running| &running.step);
         plan_text(running.chain(self.plan.iter().flatten()))
+    }
+
+    /// Sets the duration and the cost of the next step to those in the believed situation. If the metric is missing or
+    /// undefined, the cost is not changed.
+    pub(super) fn reassess(&self, step: &mut PlannedStep) {
+        let problem = self.filled();
+        let (before, advances) = advance_each(self.mission.domain(), &problem, &[step.to_plan_step()]);
+        if let Some(Ok(change)) = advances.into_iter().next() {
+            step.duration = change.duration;
+            if let (Some(before), Some(after)) = (before, change.metric) {
+                step.cost = after - before;
+            }
+        }
     }
 
     /// Returns the metric value of the action under way with the remaining plan. `None` if they are not valid, or if
@@ -319,7 +340,7 @@ impl Beliefs {
     pub(super) fn obstacle(&self, running: &Running) -> Option<String> {
         let (domain, problem) = self.remaining_mission();
         let violation = advance(&domain, &problem, &running.step.to_plan_step(), false).err()?;
-        Some(violation.message.clone())
+        Some(without_companions(&violation.message))
     }
 
     /// Returns the reason why the action under way and the remaining plan are not executable in the believed situation,
@@ -327,7 +348,7 @@ impl Beliefs {
     pub fn violation(&self) -> Option<String> {
         let (domain, problem) = self.remaining_mission();
         let verdict = validate(&domain, &problem, &self.remaining_plan(), &loop_options());
-        verdict.violation.map(|violation| self.mission.spoken(&sentence(&violation)))
+        verdict.violation.map(|violation| self.mission.spoken(&without_companions(&sentence(&violation))))
     }
 }
 

@@ -28,7 +28,9 @@ pub(super) fn execute(adaptation: &mut Adaptation<'_>, answers: &mut Vec<Answer>
         let is_planned = beliefs.plan.is_some();
         let violation = beliefs.violation();
         let next = beliefs.plan.as_mut().filter(|_| violation.is_none());
-        if let Some(step) = next.and_then(VecDeque::pop_front) {
+        if let Some(mut step) = next.and_then(VecDeque::pop_front) {
+            // The situation may have changed since the plan was made, without a reason to replan.
+            beliefs.reassess(&mut step);
             request(beliefs, step, answers);
             return;
         }

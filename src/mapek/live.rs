@@ -4,12 +4,14 @@
 //! first step to the remainder of this action. The remainder is simulated for each of its configurations in the domain
 //! of [`super::resume`], in which the action is shortened.
 
+use std::borrow::Cow;
+
 use num_rational::BigRational;
 use pddl::validate::advance_each;
 use planner::{FirstStep, Limits, Progress, Query, ReplanOutcome, Replanner};
 
 use crate::mapek::ask::{Outcome, Question};
-use crate::mapek::resume::{GATE, resume};
+use crate::mapek::resume::{remove_internal_changes, resume};
 use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
 use crate::mission::replanner;
@@ -126,16 +128,15 @@ pub(super) fn first_steps(question: &Question<'_>) -> Option<Vec<(PlannedStep, F
             |step: &PlannedStep| designs.iter().map(|design| step.with_design(function, design)).collect();
         steps = steps.iter().flat_map(|step| -> Vec<PlannedStep> { with(step) }).collect();
     }
-    let domain = resume(question.mission.domain(), &running.step, &running.progress);
+    let problem = Cow::Borrowed(question.problem);
+    let (domain, problem) = resume(question.mission.domain(), problem, &running.remainder());
     let plan_steps: Vec<_> = steps.iter().map(PlannedStep::to_plan_step).collect();
-    let (metric, advances) = advance_each(&domain, question.problem, &plan_steps);
+    let (metric, advances) = advance_each(&domain, &problem, &plan_steps);
     let before = if question.problem.metric.is_some() { metric? } else { BigRational::default() };
     let mut first = Vec::new();
     for (mut step, change) in steps.into_iter().zip(advances) {
         let Ok(mut change) = change else { continue };
-        // The gate (fact that holds once the remainder has ended) exists only in the shortened domain, and not in the
-        // planner's domain.
-        change.added.retain(|atom| atom.predicate.name.as_str() != GATE);
+        remove_internal_changes(&mut change);
         // Without a metric, plans are measured by their number of steps.
         let one_step = BigRational::from_integer(1.into());
         let metric = if question.problem.metric.is_some() { change.metric.clone()? } else { one_step };

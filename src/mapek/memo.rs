@@ -4,8 +4,9 @@
 //! An outcome that is proved for a planning problem also holds for an equal planning problem, so that no new search is
 //! needed.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
+use num_rational::BigRational;
 use pddl::ast::{Atom, InitialElement, Problem, Term};
 
 use crate::mapek::ask::{Outcome, Question};
@@ -84,8 +85,8 @@ impl StoredQuestion {
 }
 
 /// Returns the parts of an action under way on which plans depend: not the numbers of the action and of its request.
-fn relevant_part(running: &Running) -> (&PlannedStep, &num_rational::BigRational) {
-    (&running.step, &running.progress)
+fn relevant_part(running: &Running) -> (&PlannedStep, &BigRational, &BTreeMap<String, BigRational>, bool) {
+    (&running.step, &running.progress, &running.applied, running.started)
 }
 
 fn are_equal(left: &InitialElement, right: &InitialElement) -> bool {

@@ -65,7 +65,7 @@ pub use filter::{ComponentTimes, FilterSettings, MeasuredSettings, Stale};
 pub use record::{Decision, Snapshot};
 pub(crate) use record::{statement_from_record, statement_to_record};
 pub use recoverable::Recoverable;
-pub(crate) use resume::resume;
+pub(crate) use resume::{Remainder, gradual_functions, resume};
 pub(crate) use sequence::Numbers;
 pub use settings::{AdaptationSection, SafeReaction, Settings, Unrecorded};
 pub use step::PlannedStep;

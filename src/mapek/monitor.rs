@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use num_rational::BigRational;
 use ontology::vocab::local_name;
-use pddl::validate::{Advance, advance};
+use pddl::validate::{Advance, ValueChange, advance};
 use rules::{Delta, Fact};
 
 use crate::knowledge::{RobotReport, VALUE_PROPERTIES};
@@ -15,6 +15,7 @@ pub(super) use crate::mapek::changes::{Base, Changes};
 use crate::mapek::event::Event;
 use crate::mapek::fields::Refusal;
 use crate::mapek::filter::Filters;
+use crate::mapek::resume::gradual_functions;
 use crate::mapek::settings::Settings;
 use crate::message::{Message, did_you_mean};
 use crate::mission::Mission;
@@ -292,8 +293,9 @@ impl BeliefUpdate<'_> {
         let advance = self.progress(&BigRational::from_integer(1.into()))?;
         let running = self.end(action)?;
         if let Some(mut advance) = advance {
-            // Increases and decreases were applied with the progress.
-            advance.values.retain(|change| change.assigned);
+            // Gradual changes were applied with the progress.
+            let gradual = gradual_functions(self.beliefs.mission.domain(), &running.step);
+            advance.values.retain(|change| !gradual.contains(&change.function.predicate.name));
             let mut init = self.beliefs.mission.problem().init.clone();
             advance.apply(&mut init);
             self.beliefs.mission.set_init(init);
@@ -310,8 +312,8 @@ impl BeliefUpdate<'_> {
 
     fn failed(&mut self, action: u64) -> Result<(), Refusal> {
         let step = self.ended_early(action)?.step;
-        // Only consecutive failures of one step count.
-        let before = self.beliefs.failures.take().filter(|(failed, _)| *failed == step);
+        // Only consecutive failures of one step count. Its duration and cost depend on the situation.
+        let before = self.beliefs.failures.take().filter(|(failed, _)| failed.has_same_action(&step));
         let count = before.map_or(1, |(_, count)| count + 1);
         self.beliefs.failures = Some((step, count));
         Ok(())
@@ -332,7 +334,9 @@ impl BeliefUpdate<'_> {
         let Some(running) = &mut self.beliefs.running else { return Ok(None) };
         let increment = fraction - &running.progress;
         running.progress.clone_from(fraction);
-        for change in advance.iter().flat_map(|advance| &advance.values).filter(|change| !change.assigned) {
+        let gradual = gradual_functions(self.beliefs.mission.domain(), &running.step);
+        let is_gradual = |change: &&ValueChange| gradual.contains(&change.function.predicate.name);
+        for change in advance.iter().flat_map(|advance| &advance.values).filter(is_gradual) {
             let name = change.text.trim_matches(['(', ')']);
             if let (Some(now), Some(before)) = (self.beliefs.mission.value(name), &change.before) {
                 let value = number::rounded(&(&now + (&change.after - before) * &increment));

@@ -103,7 +103,8 @@ pub(super) fn from_scratch(question: &Question<'_>, limits: Limits, watch: &Watc
     let (mut domain, mut problem) =
         (Cow::Borrowed(question.mission.domain()), Cow::Borrowed(question.problem));
     if let Some(running) = question.running {
-        domain = Cow::Owned(resume(&domain, &running.step, &running.progress));
+        let (resumed, with_changes) = resume(&domain, problem, &running.remainder());
+        (domain, problem) = (Cow::Owned(resumed), with_changes);
         let goal = resumed_goal(&problem.goal);
         problem.to_mut().goal = goal;
     }

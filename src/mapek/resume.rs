@@ -4,16 +4,31 @@
 //! The paper (see [`crate::mapek`]) plans from the state in which the action has ended. Here, planning starts in the
 //! current state, with the remainder of the action as the first step. So the designs of all remaining steps are chosen
 //! together. A copy of the action's schema fixes all arguments except designs. Its duration, increases and decreases
-//! are scaled to the remainder. The copy adds a gate fact that all other actions require. A condition of the action may
-//! mention a value that the action changes. In such conditions, except those at the end, the past changes are
-//! subtracted from the value, which restores the value before the action.
+//! are scaled to the remainder. The copy adds a gate fact that all other actions require.
+//!
+//! The copy may read a value that the progress of the action has already changed: in conditions, in the amounts of its
+//! effects, and in its duration. The action reads the value without these changes. Therefore, each such function `F`
+//! has a companion function `metaplan_done_F`, which contains the change of each value so far, and the copy reads
+//! `F - metaplan_done_F`. Past increases at start are part of the values that conditions and effects at the end read.
+//! So the copy removes these increases from the companion at its start.
+//!
+//! The past changes were made with the designs of the past. With other designs, the amounts may differ. A condition such
+//! as a sufficient battery level is then about the remaining share of the new amounts. Therefore, conditions read the
+//! value as if the past changes had been made with the new designs, too. Conditional and quantified effects are not
+//! converted in this way.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 
 use num_rational::BigRational;
 use num_traits::Zero as _;
 use pddl::ast::{
     Action, ActionBody, Arithmetic, Assignment, Atom, Comparison, Condition, ConditionTime, Declaration,
-    Domain, DurationConstraint, Effect, EffectTime, Expression, Identifier, Name, Span, Term,
+    Domain, DurationConstraint, Effect, EffectTime, Expression, Identifier, InitialElement, Name, Problem,
+    Span, Term,
 };
+use pddl::validate::Advance;
+use pddl::visit::Node;
 
 use crate::mapek::step::PlannedStep;
 
@@ -22,22 +37,55 @@ use crate::mapek::step::PlannedStep;
 const LEAST_LEFT: u32 = 1000;
 
 /// Predicate that holds once the action under way has ended. Input files are assumed not to declare it.
-pub(super) const GATE: &str = "metaplan_resumed";
+const GATE: &str = "metaplan_resumed";
 
-/// Returns `domain` with the gate and, as the first action, a copy of the schema of `running` that is shortened to the
-/// remainder. `done` is the completed share of `running`, from 0 to 1.
-pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational) -> Domain {
-    let mut gated = domain.clone();
-    gated.predicates.push(Declaration { identifier: identifier(GATE), parameters: Vec::new() });
-    for action in &mut gated.actions {
-        require(action, Condition::Atom(gate()));
+/// Predicate that holds once the remainder of the action under way has started, so that the remainder occurs exactly
+/// once. The gate itself cannot ensure this: without a duration, start and end are one happening, in which the gate
+/// would be both required to be false and added.
+const STARTED: &str = "metaplan_remainder_started";
+
+/// Prefix of the names of companion functions.
+const DONE: &str = "metaplan_done_";
+
+/// The action under way, and the part of its effects that the state already contains.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Remainder<'a> {
+    pub step: &'a PlannedStep,
+    /// Completed share of the action, from 0 to 1.
+    pub progress: &'a BigRational,
+    /// Changes of values by the progress, by the text of the function without parentheses.
+    pub applied: &'a BTreeMap<String, BigRational>,
+    /// Whether the action is known to have started.
+    pub has_started: bool,
+}
+
+/// Returns `domain` with the gate and, as the first action, a copy of the action's schema that is shortened to the
+/// remainder. Returns `problem` with the values of the companion functions that the copy reads.
+pub(crate) fn resume<'p>(
+    domain: &Domain,
+    problem: Cow<'p, Problem>,
+    remainder: &Remainder<'_>,
+) -> (Domain, Cow<'p, Problem>) {
+    let (mut gated, mut problem) = (domain.clone(), problem);
+    for name in [GATE, STARTED] {
+        gated.predicates.push(Declaration { identifier: identifier(name), parameters: Vec::new() });
     }
-    let name = Name::new(&running.action);
-    let context = running.context();
-    let schemas = domain.actions.iter().filter(|action| action.identifier.name == name);
-    for schema in schemas.filter(|schema| schema.parameters.len() == context.len()) {
+    for action in &mut gated.actions {
+        require(action, Condition::Atom(flag(GATE)));
+    }
+    let context = remainder.step.context();
+    let mut restored = BTreeSet::new();
+    let gradual = gradual_functions(domain, remainder.step);
+    for schema in schemas(domain, remainder.step) {
         let mut copy = schema.clone();
-        shorten(&mut copy, done);
+        let functions = functions_to_restore(schema, &gradual, remainder);
+        if remainder.has_started && has_reached_facts(schema, remainder.step, &problem) {
+            waive_start_conditions(&mut copy);
+        }
+        let mut shortening = Shortening::new(remainder.progress, &gradual, &functions);
+        shortening.compare_designs(schema, remainder.step);
+        shortening.shorten(&mut copy);
+        restored.extend(functions);
         for (parameter, value) in schema.parameters.iter().zip(&context) {
             if let Some(value) = value {
                 let variable = Term::Variable(parameter.identifier.clone());
@@ -45,142 +93,406 @@ pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational)
                 require(&mut copy, Condition::Equal(variable, constant, Span::default()));
             }
         }
-        // The copy requires that the gate fact does not hold, and adds this fact. So the remainder occurs exactly once.
-        require(&mut copy, Condition::Not(Box::new(Condition::Atom(gate()))));
+        require(&mut copy, Condition::Not(Box::new(Condition::Atom(flag(STARTED)))));
         open(&mut copy);
         // The copy comes first: if no schema of this name can start, the validator reports the violation of the copy.
         gated.actions.insert(0, copy);
     }
-    gated
+    let companions = domain.functions.iter().filter(|function| restored.contains(&function.identifier.name));
+    let companion = |function: &Declaration| Declaration {
+        identifier: done(&function.identifier.name),
+        parameters: function.parameters.clone(),
+    };
+    gated.functions.extend(companions.map(companion));
+    if !restored.is_empty() {
+        state_changes(problem.to_mut(), &restored, remainder.applied);
+    }
+    (gated, problem)
 }
 
 pub(crate) fn resumed_goal(goal: &Condition) -> Condition {
-    Condition::And(vec![goal.clone(), Condition::Atom(gate())])
+    Condition::And(vec![goal.clone(), Condition::Atom(flag(GATE))])
 }
 
-/// Scales the duration, increases and decreases of an action to the share that is not yet `done`. In its conditions,
-/// except those at the end, each fluent that the action increases or decreases is replaced by its value before the
-/// action.
-fn shorten(action: &mut Action, done: &BigRational) {
-    let remaining_share = BigRational::from_integer(1.into()) - done;
-    let (duration, conditions, effects) = match &mut action.body {
-        ActionBody::Durative { duration, conditions, effects } => (duration, conditions, effects),
-        // The robot can report progress of an action without duration, too.
-        ActionBody::Instantaneous { precondition, effect } => {
-            if !done.is_zero() {
-                let mut changes = Vec::new();
-                shorten_effect(effect, &remaining_share, None, &mut changes);
-                restore_condition(precondition, done, &changes);
+/// Returns the functions whose values change in proportion to the progress of the action: the action increases or
+/// decreases them, and neither assigns nor scales any value of them.
+pub(crate) fn gradual_functions(domain: &Domain, step: &PlannedStep) -> BTreeSet<Name> {
+    let (mut gradual, mut others) = (BTreeSet::new(), BTreeSet::new());
+    for effect in schemas(domain, step).flat_map(|schema| schema.body.effects()) {
+        effect.walk(&mut |node| {
+            if let Node::Effect(Effect::Assign(kind, target, ..)) = node {
+                let is_gradual = matches!(kind, Assignment::Increase | Assignment::Decrease);
+                let functions = if is_gradual { &mut gradual } else { &mut others };
+                functions.insert(target.predicate.name.clone());
             }
+        });
+    }
+    gradual.retain(|function| !others.contains(function));
+    gradual
+}
+
+/// Removes changes of predicates and functions that exist only in the domain with the remainder.
+pub(super) fn remove_internal_changes(change: &mut Advance) {
+    let is_internal = |atom: &Atom| {
+        let name = atom.predicate.name.as_str();
+        [GATE, STARTED].contains(&name) || name.starts_with(DONE)
+    };
+    change.added.retain(|atom| !is_internal(atom));
+    change.values.retain(|value| !is_internal(&value.function));
+}
+
+/// Returns a message about the domain with the remainder without its companion functions: `(f a)` in place of
+/// `(- (f a) (metaplan_done_f a))`.
+pub(super) fn without_companions(message: &str) -> String {
+    let mut text = message.to_owned();
+    let companion = format!(" ({DONE}");
+    while let Some(position) = text.find(&companion) {
+        let operation = text[..position].rfind("(- ");
+        let end = text[position..].find("))").map(|length| position + length + 2);
+        let (Some(operation), Some(end)) = (operation, end) else { break };
+        text.replace_range(position..end, "");
+        text.replace_range(operation..operation + "(- ".len(), "");
+    }
+    text
+}
+
+fn schemas<'d>(domain: &'d Domain, step: &PlannedStep) -> impl Iterator<Item = &'d Action> {
+    let (name, count) = (Name::new(&step.action), step.arguments.len());
+    domain
+        .actions
+        .iter()
+        .filter(move |action| action.identifier.name == name && action.parameters.len() == count)
+}
+
+/// Returns the gradual functions whose values the copy must not read as they are. These are the functions with changed
+/// values, and those that the action changes at its start, because the copy contains only the rest of this change.
+fn functions_to_restore(
+    schema: &Action,
+    gradual: &BTreeSet<Name>,
+    remainder: &Remainder<'_>,
+) -> BTreeSet<Name> {
+    let changed = remainder.applied.iter().filter(|(_, change)| !change.is_zero());
+    let mut functions: BTreeSet<Name> =
+        changed.filter_map(|(text, _)| text.split_whitespace().next().map(Name::new)).collect();
+    if let ActionBody::Durative { effects, .. } = &schema.body
+        && !remainder.progress.is_zero()
+    {
+        for (_, effect) in effects.iter().filter(|(time, _)| *time == EffectTime::AtStart) {
+            effect.walk(&mut |node| {
+                if let Node::Effect(Effect::Assign(_, target, ..)) = node {
+                    functions.insert(target.predicate.name.clone());
+                }
+            });
+        }
+    }
+    let mut read = BTreeSet::new();
+    schema.body.walk(&mut |node| read.extend(node.fluent().map(|atom| atom.predicate.name.clone())));
+    for preference in &schema.preferences {
+        preference.condition.walk_fluents(&mut |atom| {
+            read.insert(atom.predicate.name.clone());
+        });
+    }
+    functions.retain(|function| gradual.contains(function) && read.contains(function));
+    functions
+}
+
+/// Adds the companion of each value of the functions `restored`. A function without a value has no companion either,
+/// so that both remain undefined.
+fn state_changes(problem: &mut Problem, restored: &BTreeSet<Name>, applied: &BTreeMap<String, BigRational>) {
+    let applied: BTreeMap<Vec<Name>, &BigRational> = applied
+        .iter()
+        .map(|(text, change)| (text.split_whitespace().map(Name::new).collect(), change))
+        .collect();
+    let companion = |element: &InitialElement| match element {
+        InitialElement::Value(atom, ..) if restored.contains(&atom.predicate.name) => {
+            let words: Vec<Name> = std::iter::once(&atom.predicate.name)
+                .chain(atom.arguments.iter().map(Term::name))
+                .cloned()
+                .collect();
+            let change = applied.get(&words).map(|change| (*change).clone()).unwrap_or_default();
+            Some(InitialElement::Value(done_atom(atom), change, Span::default()))
+        }
+        _ => None,
+    };
+    let companions: Vec<InitialElement> = problem.init.iter().filter_map(companion).collect();
+    problem.init.extend(companions);
+}
+
+/// Returns `true` if the facts in the state of `problem` already are those after the action, which changes at least one
+/// fact. Returns `false` if changes of facts are conditional or quantified.
+fn has_reached_facts(schema: &Action, step: &PlannedStep, problem: &Problem) -> bool {
+    let parameters = schema.parameters.iter().map(|parameter| &parameter.identifier.name);
+    let arguments: BTreeMap<&Name, Name> =
+        parameters.zip(step.arguments.iter().map(|argument| Name::new(argument))).collect();
+    let value = |term: &Term| match term {
+        Term::Variable(variable) => arguments.get(&variable.name).unwrap_or(&variable.name).clone(),
+        Term::Constant(constant) => constant.name.clone(),
+    };
+    let ground =
+        |atom: &Atom| (atom.predicate.name.clone(), atom.arguments.iter().map(value).collect::<Vec<_>>());
+    let (mut added, mut deleted) = (BTreeSet::new(), BTreeSet::new());
+    let mut parts: Vec<&Effect> = schema.body.effects().collect();
+    while let Some(part) = parts.pop() {
+        match part {
+            Effect::And(subeffects) => parts.extend(subeffects),
+            Effect::Add(atom) => {
+                added.insert(ground(atom));
+            }
+            Effect::Delete(atom) => {
+                deleted.insert(ground(atom));
+            }
+            Effect::ForAll(..) | Effect::When(..) if !changed_predicates(part).is_empty() => return false,
+            _ => {}
+        }
+    }
+    deleted.retain(|fact| !added.contains(fact));
+    let mut missing = added.clone();
+    for fact in problem.init.iter().filter_map(InitialElement::fact) {
+        if deleted.contains(&fact) {
+            return false;
+        }
+        missing.remove(&fact);
+    }
+    missing.is_empty() && !(added.is_empty() && deleted.is_empty())
+}
+
+fn changed_predicates(effect: &Effect) -> BTreeSet<Name> {
+    let mut predicates = BTreeSet::new();
+    effect.walk(&mut |node| {
+        if let Node::Effect(Effect::Add(atom) | Effect::Delete(atom)) = node {
+            predicates.insert(atom.predicate.name.clone());
+        }
+    });
+    predicates
+}
+
+/// Removes the start conditions about facts that the action itself changes.
+fn waive_start_conditions(action: &mut Action) {
+    let predicates: BTreeSet<Name> = action.body.effects().flat_map(changed_predicates).collect();
+    match &mut action.body {
+        ActionBody::Instantaneous { precondition, .. } => waive(precondition, &predicates),
+        ActionBody::Durative { conditions, .. } => {
+            for (_, condition) in conditions.iter_mut().filter(|(time, _)| *time == ConditionTime::AtStart) {
+                waive(condition, &predicates);
+            }
+        }
+    }
+}
+
+fn waive(condition: &mut Condition, predicates: &BTreeSet<Name>) {
+    if let Condition::And(parts) = condition {
+        for part in parts {
+            waive(part, predicates);
+        }
+        return;
+    }
+    let (mut is_about, mut is_numeric) = (false, false);
+    condition.walk(&mut |node| {
+        is_about |= node.atom().is_some_and(|atom| predicates.contains(&atom.predicate.name));
+        is_numeric |= matches!(node, Node::Condition(Condition::Compare(..)));
+    });
+    if is_about && !is_numeric {
+        *condition = Condition::And(Vec::new());
+    }
+}
+
+/// Parameters of the compilation of a schema to its remainder.
+struct Shortening<'a> {
+    progress: &'a BigRational,
+    remaining_share: BigRational,
+    /// Remaining share of the duration, which is not 0. Without a duration, start and end would be one happening, in
+    /// which the end effects could violate start conditions.
+    time_left: BigRational,
+    gradual: &'a BTreeSet<Name>,
+    /// Functions with companions.
+    restored: &'a BTreeSet<Name>,
+    /// Changed values, each with its change by the whole action minus the change with the present designs.
+    differences: Vec<(Atom, Expression)>,
+}
+
+impl<'a> Shortening<'a> {
+    fn new(progress: &'a BigRational, gradual: &'a BTreeSet<Name>, restored: &'a BTreeSet<Name>) -> Self {
+        let remaining_share = BigRational::from_integer(1.into()) - progress;
+        let time_left = remaining_share.clone().max(BigRational::new(1.into(), LEAST_LEFT.into()));
+        Self { progress, remaining_share, time_left, gradual, restored, differences: Vec::new() }
+    }
+
+    /// Collects the differences between the changes with open designs and those with the designs of `step`.
+    fn compare_designs(&mut self, schema: &Action, step: &PlannedStep) {
+        let context = step.context();
+        let parameters = schema.parameters.iter().zip(&step.arguments).zip(&context);
+        let designs: BTreeMap<&Name, &String> = parameters
+            .filter(|(_, value)| value.is_none())
+            .map(|((parameter, design), _)| (&parameter.identifier.name, design))
+            .collect();
+        if self.progress.is_zero() || designs.is_empty() {
             return;
         }
-    };
-    // Without a duration, start and end would be one happening, in which the end effects could violate start
-    // conditions.
-    let time_left = remaining_share.clone().max(BigRational::new(1.into(), LEAST_LEFT.into()));
-    let whole = duration.iter().find(|constraint| constraint.operator == Comparison::Equal);
-    let whole = whole.map(|constraint| constraint.expression.clone());
-    let mut changes = Vec::new();
-    for (_, effect) in effects.iter_mut() {
-        shorten_effect(effect, &remaining_share, whole.as_ref(), &mut changes);
-    }
-    // Conditions at the end are about the final values, which the remainder reaches.
-    for (_, condition) in conditions.iter_mut().filter(|(time, _)| *time != ConditionTime::AtEnd) {
-        restore_condition(condition, done, &changes);
-    }
-    for DurationConstraint { expression, .. } in duration {
-        *expression = product(&time_left, expression.clone());
-    }
-}
-
-/// Multiplies increases and decreases by `remaining_share`. Appends the unscaled change of each fluent to `changes`.
-/// `whole` is the full duration, which replaces `?duration`.
-fn shorten_effect(
-    effect: &mut Effect,
-    remaining_share: &BigRational,
-    whole: Option<&Expression>,
-    changes: &mut Vec<(Atom, Expression)>,
-) {
-    match effect {
-        Effect::And(parts) => {
-            for part in parts {
-                shorten_effect(part, remaining_share, whole, changes);
-            }
-        }
-        Effect::ForAll(_, body) | Effect::When(_, body) => {
-            shorten_effect(body, remaining_share, whole, changes);
-        }
-        Effect::Assign(kind @ (Assignment::Increase | Assignment::Decrease), target, value, _) => {
-            if let Some(whole) = whole {
-                substitute(value, &|part| matches!(part, Expression::Duration(_)).then(|| whole.clone()));
-            }
-            let sign = BigRational::from_integer(if *kind == Assignment::Increase { 1 } else { -1 }.into());
-            changes.push((target.clone(), product(&sign, value.clone())));
-            *value = product(remaining_share, value.clone());
-        }
-        Effect::Assign(..) | Effect::Add(_) | Effect::Delete(_) => {}
-    }
-}
-
-/// Replaces each fluent in a condition by its value before the action: the fluent minus the share `done` of its
-/// `changes`.
-fn restore_condition(condition: &mut Condition, done: &BigRational, changes: &[(Atom, Expression)]) {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                restore_condition(part, done, changes);
-            }
-        }
-        Condition::Not(body) | Condition::Exists(_, body) | Condition::ForAll(_, body) => {
-            restore_condition(body, done, changes);
-        }
-        Condition::Imply(left, right) => {
-            restore_condition(left, done, changes);
-            restore_condition(right, done, changes);
-        }
-        Condition::Compare(_, left, right, _) => {
-            let before = |part: &Expression| {
-                let Expression::Fluent(atom) = part else { return None };
-                let mut value = part.clone();
-                for (_, change) in changes.iter().filter(|(target, _)| is_same(target, atom)) {
-                    let so_far = product(done, change.clone());
-                    value = Expression::Operation(Arithmetic::Subtract, vec![value, so_far], Span::default());
+        let whole =
+            schema.body.durations().iter().find(|constraint| constraint.operator == Comparison::Equal);
+        let mut parts: Vec<&Effect> = schema.body.effects().collect();
+        while let Some(part) = parts.pop() {
+            match part {
+                Effect::And(subeffects) => parts.extend(subeffects),
+                Effect::Assign(kind, target, value, _) if self.gradual.contains(&target.predicate.name) => {
+                    let mut open = value.clone();
+                    open.change_leaves(&mut |leaf| match (&*leaf, whole) {
+                        (Expression::Duration(_), Some(whole)) => leaf.clone_from(&whole.expression),
+                        _ => self.restore(leaf),
+                    });
+                    if let Some(present) = with_designs(&open, &designs) {
+                        let (left, right) =
+                            if *kind == Assignment::Increase { (open, present) } else { (present, open) };
+                        let difference =
+                            Expression::Operation(Arithmetic::Subtract, vec![left, right], Span::default());
+                        self.differences.push((target.clone(), difference));
+                    }
                 }
-                Some(value)
-            };
-            substitute(left, &before);
-            substitute(right, &before);
+                _ => {}
+            }
         }
-        Condition::Atom(_) | Condition::Equal(..) => {}
+    }
+
+    /// Scales the duration, increases and decreases of an action to the remaining share, and restores the values that
+    /// the action reads.
+    fn shorten(&self, action: &mut Action) {
+        let changed: BTreeSet<Name> = action.body.effects().flat_map(changed_functions).collect();
+        for preference in &mut action.preferences {
+            preference.condition.change_leaves(&mut |leaf| self.restore_in_condition(leaf));
+        }
+        match &mut action.body {
+            // The robot can report progress of an action without duration, too.
+            ActionBody::Instantaneous { precondition, effect } => {
+                precondition.change_leaves(&mut |leaf| self.restore_in_condition(leaf));
+                effect.change_leaves(&mut |leaf| self.restore(leaf));
+                self.shorten_effect(effect, false);
+            }
+            ActionBody::Durative { duration, conditions, effects } => {
+                let whole = duration.iter().find(|constraint| constraint.operator == Comparison::Equal);
+                let whole = whole.map(|constraint| constraint.expression.clone());
+                let whole = self.whole_duration(whole, &changed);
+                for (_, condition) in conditions {
+                    condition.change_leaves(&mut |leaf| self.restore_in_condition(leaf));
+                }
+                for (time, effect) in effects {
+                    effect.change_leaves(&mut |leaf| match leaf {
+                        Expression::Duration(_) => leaf.clone_from(&whole),
+                        leaf => self.restore(leaf),
+                    });
+                    self.shorten_effect(effect, *time == EffectTime::AtStart);
+                }
+                for DurationConstraint { expression, .. } in duration {
+                    expression.change_leaves(&mut |leaf| self.restore(leaf));
+                    *expression = product(&self.time_left, expression.clone());
+                }
+            }
+        }
+    }
+
+    /// Returns the duration of the whole action, which replaces `?duration` in effects. This is the expression of its
+    /// constraint, unless its value may change during the action.
+    fn whole_duration(&self, stated: Option<Expression>, changed: &BTreeSet<Name>) -> Expression {
+        let is_constant = |expression: &Expression| {
+            let mut is_constant = true;
+            expression.walk_fluents(&mut |atom| is_constant &= !changed.contains(&atom.predicate.name));
+            is_constant
+        };
+        stated
+            .filter(is_constant)
+            .unwrap_or_else(|| product(&self.time_left.recip(), Expression::Duration(Span::default())))
+    }
+
+    /// Multiplies increases and decreases of gradual functions by the remaining share. At the start, each one also
+    /// removes its past share from the companion.
+    fn shorten_effect(&self, effect: &mut Effect, is_start: bool) {
+        let Effect::Assign(kind, target, value, _) = effect else {
+            effect.parts_mut().iter_mut().for_each(|part| self.shorten_effect(part, is_start));
+            return;
+        };
+        if !self.gradual.contains(&target.predicate.name) {
+            return;
+        }
+        let past_share = product(self.progress, value.clone());
+        *value = product(&self.remaining_share, value.clone());
+        if is_start && self.restored.contains(&target.predicate.name) {
+            let opposite =
+                if *kind == Assignment::Increase { Assignment::Decrease } else { Assignment::Increase };
+            let companion = Effect::Assign(opposite, done_atom(target), past_share, Span::default());
+            *effect = Effect::And(vec![effect.clone(), companion]);
+        }
+    }
+
+    /// Subtracts the changes so far from a value that a condition of the copy reads, as if they had been made with the
+    /// designs of the copy.
+    fn restore_in_condition(&self, leaf: &mut Expression) {
+        let Expression::Fluent(atom) = &*leaf else { return };
+        let differences = self.differences.iter().filter(|(target, _)| is_same(target, atom));
+        let differences: Vec<Expression> =
+            differences.map(|(_, difference)| product(self.progress, difference.clone())).collect();
+        self.restore(leaf);
+        for difference in differences {
+            *leaf =
+                Expression::Operation(Arithmetic::Subtract, vec![leaf.clone(), difference], Span::default());
+        }
+    }
+
+    /// Subtracts the changes so far from a value that the copy reads.
+    fn restore(&self, leaf: &mut Expression) {
+        if let Expression::Fluent(atom) = leaf
+            && self.restored.contains(&atom.predicate.name)
+        {
+            let so_far = Expression::Fluent(done_atom(atom));
+            *leaf = Expression::Operation(Arithmetic::Subtract, vec![leaf.clone(), so_far], Span::default());
+        }
     }
 }
 
-/// Replaces each subexpression for which `replace` returns an expression. Replacements are not visited.
-fn substitute(expression: &mut Expression, replace: &dyn Fn(&Expression) -> Option<Expression>) {
-    if let Some(replacement) = replace(expression) {
-        *expression = replacement;
-    } else if let Expression::Operation(_, parts, _) = expression {
-        for part in parts {
-            substitute(part, replace);
+/// Replaces open designs by the present ones. Returns `None` if there are none, or if the value depends on a chosen
+/// duration, which is unknown for the present designs.
+fn with_designs(expression: &Expression, designs: &BTreeMap<&Name, &String>) -> Option<Expression> {
+    let mut present = expression.clone();
+    let (mut is_open, mut is_chosen) = (false, false);
+    present.change_leaves(&mut |leaf| match leaf {
+        Expression::Fluent(atom) => {
+            for term in &mut atom.arguments {
+                if let Some(design) = designs.get(term.name()) {
+                    *term = Term::Constant(identifier(design));
+                    is_open = true;
+                }
+            }
         }
-    }
-}
-
-fn product(factor: &BigRational, expression: Expression) -> Expression {
-    let factor = Expression::Number(factor.clone(), Span::default());
-    Expression::Operation(Arithmetic::Multiply, vec![factor, expression], Span::default())
+        Expression::Duration(_) => is_chosen = true,
+        _ => {}
+    });
+    (is_open && !is_chosen).then_some(present)
 }
 
 fn is_same(left: &Atom, right: &Atom) -> bool {
-    let are_equal = |(left, right): (&Term, &Term)| match (left, right) {
-        (Term::Variable(left), Term::Variable(right)) | (Term::Constant(left), Term::Constant(right)) => {
-            left.name == right.name
-        }
-        _ => false,
-    };
     left.predicate.name == right.predicate.name
-        && left.arguments.len() == right.arguments.len()
-        && left.arguments.iter().zip(&right.arguments).all(are_equal)
+        && left.arguments.iter().map(Term::name).eq(right.arguments.iter().map(Term::name))
+}
+
+fn changed_functions(effect: &Effect) -> BTreeSet<Name> {
+    let mut functions = BTreeSet::new();
+    effect.walk(&mut |node| {
+        if let Node::Effect(Effect::Assign(_, target, ..)) = node {
+            functions.insert(target.predicate.name.clone());
+        }
+    });
+    functions
+}
+
+/// Returns the product. Constants are folded, because the planner treats constant durations and amounts more
+/// efficiently.
+fn product(factor: &BigRational, expression: Expression) -> Expression {
+    match expression {
+        Expression::Number(value, span) => Expression::Number(factor * value, span),
+        expression if *factor == BigRational::from_integer(1.into()) => expression,
+        expression => {
+            let factor = Expression::Number(factor.clone(), Span::default());
+            Expression::Operation(Arithmetic::Multiply, vec![factor, expression], Span::default())
+        }
+    }
 }
 
 fn require(action: &mut Action, added: Condition) {
@@ -197,14 +509,26 @@ fn open(action: &mut Action) {
     match &mut action.body {
         ActionBody::Instantaneous { effect, .. } => {
             let before = std::mem::replace(effect, Effect::And(Vec::new()));
-            *effect = Effect::And(vec![before, Effect::Add(gate())]);
+            *effect = Effect::And(vec![before, Effect::Add(flag(STARTED)), Effect::Add(flag(GATE))]);
         }
-        ActionBody::Durative { effects, .. } => effects.push((EffectTime::AtEnd, Effect::Add(gate()))),
+        ActionBody::Durative { effects, .. } => {
+            effects.push((EffectTime::AtStart, Effect::Add(flag(STARTED))));
+            effects.push((EffectTime::AtEnd, Effect::Add(flag(GATE))));
+        }
     }
 }
 
-fn gate() -> Atom {
-    Atom { predicate: identifier(GATE), arguments: Vec::new(), span: Span::default() }
+fn flag(predicate: &str) -> Atom {
+    Atom { predicate: identifier(predicate), arguments: Vec::new(), span: Span::default() }
+}
+
+fn done(function: &Name) -> Identifier {
+    identifier(&format!("{DONE}{function}"))
+}
+
+/// Returns the companion of a function with the same arguments.
+fn done_atom(atom: &Atom) -> Atom {
+    Atom { predicate: done(&atom.predicate.name), ..atom.clone() }
 }
 
 fn identifier(name: &str) -> Identifier {

@@ -79,6 +79,12 @@ impl PlannedStep {
         }
     }
 
+    /// Returns `true` if the other step is the same action with the same arguments and designs.
+    pub(crate) fn has_same_action(&self, other: &Self) -> bool {
+        let key = |step: &Self| (step.action.clone(), step.arguments.clone(), step.configuration.clone());
+        key(self) == key(other)
+    }
+
     /// Returns the action with all arguments in PDDL syntax: `(move a b)`.
     pub fn call(&self) -> String {
         let words: Vec<&str> =

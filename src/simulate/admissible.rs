@@ -6,31 +6,36 @@
 //! context (`t:requiresQuality`) and a sufficient battery level. A condition that mentions the design of another
 //! function is omitted until that design is chosen.
 
-use num_rational::BigRational;
+use std::borrow::Cow;
+
 use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Name, Problem, Term};
 use pddl::validate::advance;
 use pddl::visit::Node;
 
-use crate::mapek::{PlannedStep, resume};
+use crate::mapek::{PlannedStep, Remainder, resume};
 
 /// The conditions of an action that can be checked although some of its designs are not chosen yet.
 pub(super) struct Admission<'p> {
     domain: Domain,
-    problem: &'p Problem,
+    problem: Cow<'p, Problem>,
 }
 
 impl<'p> Admission<'p> {
-    /// Collects the conditions of a step. `done` is the completed share of the step, if it is
+    /// Collects the conditions of a step. `remainder` describes the action under way, if the step is
     /// running. The functions in `undecided` have no chosen design yet, so conditions that mention
     /// their designs are omitted.
     pub(super) fn new(
         domain: &Domain,
         problem: &'p Problem,
         step: &PlannedStep,
-        done: Option<&BigRational>,
+        remainder: Option<Remainder<'_>>,
         undecided: &[&str],
     ) -> Self {
-        let mut domain = done.map_or_else(|| domain.clone(), |done| resume(domain, step, done));
+        let problem = Cow::Borrowed(problem);
+        let (mut domain, problem) = match remainder {
+            Some(remainder) => resume(domain, problem, &Remainder { step, ..remainder }),
+            None => (domain.clone(), problem),
+        };
         let is_undecided =
             |word: &String| undecided.iter().any(|function| step.design(function) == Some(word.as_str()));
         let name = Name::new(&step.action);
@@ -48,7 +53,7 @@ impl<'p> Admission<'p> {
     }
 
     pub(super) fn admits(&self, step: &PlannedStep) -> bool {
-        advance(&self.domain, self.problem, &step.to_plan_step(), false).is_ok()
+        advance(&self.domain, &self.problem, &step.to_plan_step(), false).is_ok()
     }
 }
 

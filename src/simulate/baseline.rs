@@ -152,7 +152,7 @@ impl Controller {
         }
         if let Some(step) = self.plan.pop_front() {
             let step =
-                if self.strategy.chooses_designs() { self.choose(&step, None, |_| true) } else { step };
+                if self.strategy.chooses_designs() { self.choose(&step, false, |_| true) } else { step };
             self.control.request_now(step, answers);
         } else if self.strategy != Strategy::None
             && self.planned_with != *self.control.beliefs().available()
@@ -169,14 +169,16 @@ impl Controller {
     }
 
     /// Returns `step` with designs chosen by the strategy for those functions for which `concerns`
-    /// returns `true`. `done` is the completed share of the step, if it is running.
+    /// returns `true`. `is_running` is `true` if the step is the action under way.
     fn choose(
         &mut self,
         step: &PlannedStep,
-        done: Option<&BigRational>,
+        is_running: bool,
         concerns: impl Fn(&str) -> bool,
     ) -> PlannedStep {
-        let mission = self.control.beliefs().mission();
+        let beliefs = self.control.beliefs();
+        let remainder = beliefs.remainder().filter(|_| is_running);
+        let mission = beliefs.mission();
         let mut problem = mission.problem().clone();
         mission.fill(&mut problem);
         let mut chosen = step.clone();
@@ -186,7 +188,7 @@ impl Controller {
             let designs = self.control.designs_for(function);
             // Conditions on the later functions are ignored until their designs are chosen.
             let undecided = &functions[index + 1..];
-            let admission = Admission::new(mission.domain(), &problem, &chosen, done, undecided);
+            let admission = Admission::new(mission.domain(), &problem, &chosen, remainder, undecided);
             let admits = |design: &&String| admission.admits(&chosen.with_design(function, design));
             let admissible: Vec<String> = designs.iter().filter(admits).cloned().collect();
             // Without an admissible design, the design of the plan has the best chance to become
@@ -212,19 +214,19 @@ impl Controller {
         }
         // Designs that are chosen one after the other may be impossible together. Then those of the
         // plan are used if they are possible.
-        let whole = Admission::new(mission.domain(), &problem, step, done, &[]);
+        let whole = Admission::new(mission.domain(), &problem, step, remainder, &[]);
         if !whole.admits(&chosen) && whole.admits(step) { step.clone() } else { chosen }
     }
 
     fn replace_lost(&mut self, answers: &mut Vec<Answer>) {
         let beliefs = self.control.beliefs();
         let Some((_, step)) = beliefs.running() else { return };
-        let (step, done) = (step.clone(), beliefs.progress().cloned());
+        let step = step.clone();
         let available = beliefs.available().clone();
         let is_lost =
             |function: &str| step.design(function).is_some_and(|design| !available.contains(design));
         if step.configuration.iter().any(|(function, _)| is_lost(function)) {
-            let chosen = self.choose(&step, done.as_ref(), is_lost);
+            let chosen = self.choose(&step, true, is_lost);
             self.control.reconfigure_now(chosen, answers);
         }
     }

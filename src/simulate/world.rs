@@ -5,12 +5,15 @@
 //! do not hold for its remaining part. It fails when it has stalled for the simulation's `patience`. The seed alone
 //! determines everything random, so all strategies face the same world.
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
 use pddl::ast::{Condition, Direction, Domain, Problem};
-use pddl::validate::{Options, PlanText, advance, metric_after, validate};
+use pddl::validate::{Options, PlanText, ValueChange, advance, metric_after, validate};
 
-use crate::mapek::{Command, Effect, Event, PlannedStep, resume};
+use crate::mapek::{Command, Effect, Event, PlannedStep, Remainder, gradual_functions, resume};
 use crate::message::Message;
 use crate::mission::Mission;
 use crate::number;
@@ -26,6 +29,8 @@ struct Job {
     step: PlannedStep,
     /// Completed share of the action, from 0 to 1.
     progress: f64,
+    /// Changes of values by the progress, by the text of the function.
+    applied: BTreeMap<String, BigRational>,
     /// Duration for which the action has stalled without interruption.
     waited: f64,
     suspended: bool,
@@ -125,7 +130,14 @@ impl World {
         match &effect.command {
             Command::Request { step } => {
                 let (action, step) = (effect.action, step.clone());
-                self.job = Some(Job { action, step, progress: 0.0, waited: 0.0, suspended: false });
+                self.job = Some(Job {
+                    action,
+                    step,
+                    progress: 0.0,
+                    applied: BTreeMap::new(),
+                    waited: 0.0,
+                    suspended: false,
+                });
                 vec![Event::Started { action: effect.action }]
             }
             Command::Reconfigure { function, to, .. } => {
@@ -158,8 +170,11 @@ impl World {
         if job.suspended {
             return None;
         }
-        let domain = resume(self.truth.domain(), &job.step, &exact(job.progress));
-        let advance = advance(&domain, &self.truth.current(), &job.step.to_plan_step(), false).ok()?;
+        let progress = &exact(job.progress);
+        let remainder = Remainder { step: &job.step, progress, applied: &job.applied, has_started: true };
+        let problem = self.truth.current();
+        let (domain, problem) = resume(self.truth.domain(), Cow::Borrowed(&*problem), &remainder);
+        let advance = advance(&domain, &problem, &job.step.to_plan_step(), false).ok()?;
         Some(number::to_f64(&advance.duration) * self.slowness(&job.step))
     }
 
@@ -210,7 +225,7 @@ impl World {
         let whole = step >= remaining_time;
         let share = if whole { 1.0 - job.progress } else { (1.0 - job.progress) * step / remaining_time };
         job.progress = rounded(job.progress + share);
-        self.use_up(&job.step, share, whole, events);
+        self.use_up(&mut job, share, whole, events);
         if self
             .settings
             .suave
@@ -229,20 +244,28 @@ impl World {
     }
 
     /// Applies the effects of a share of an action: numeric increases and decreases in proportion
-    /// to the share, and, if `whole`, also assignments and changes of facts.
-    fn use_up(&mut self, step: &PlannedStep, share: f64, whole: bool, events: &mut Vec<Event>) {
-        let Ok(mut advance) = advance(self.truth.domain(), &self.truth.current(), &step.to_plan_step(), true)
-        else {
+    /// to the share, and, if `whole`, also other changes of values and changes of facts. The effects are
+    /// those in the state before the action.
+    fn use_up(&mut self, job: &mut Job, share: f64, whole: bool, events: &mut Vec<Event>) {
+        let mut before = (*self.truth.current()).clone();
+        for (name, change) in &job.applied {
+            Mission::add_to_value(&mut before, name, &-change);
+        }
+        let gradual = gradual_functions(self.truth.domain(), &job.step);
+        let is_gradual = |change: &ValueChange| gradual.contains(&change.function.predicate.name);
+        let Ok(mut advance) = advance(self.truth.domain(), &before, &job.step.to_plan_step(), true) else {
             return;
         };
         let share = exact(share);
-        for change in advance.values.iter_mut().filter(|change| !change.assigned) {
-            if let Some(before) = &change.before {
-                change.after = number::rounded(&(before + (&change.after - before) * &share));
+        for change in advance.values.iter_mut().filter(|change| is_gradual(change)) {
+            let name = change.text.trim_matches(['(', ')']);
+            if let (Some(now), Some(before)) = (self.truth.value(name), &change.before) {
+                change.after = number::rounded(&(&now + (&change.after - before) * &share));
+                *job.applied.entry(name.to_owned()).or_default() += &change.after - now;
             }
         }
         if !whole {
-            advance.values.retain(|change| !change.assigned);
+            advance.values.retain(is_gradual);
             (advance.added, advance.deleted) = (Vec::new(), Vec::new());
         }
         let mut init = self.truth.problem().init.clone();

@@ -20,3 +20,33 @@ pub fn feed(control: &mut Loop, line: &str) -> Vec<Answer> {
     let now = control.beliefs().now() + Duration::from_millis(100);
     control.handle(&Observation::parse(line), now)
 }
+
+/// Returns a loop, not started, for the knowledge base of the UGV with this domain and problem. `sections` end its
+/// manifest.
+pub fn own(domain: &str, problem: &str, sections: &str) -> Loop {
+    let knowledge = Path::new(env!("CARGO_MANIFEST_DIR")).join("ontology/kb/ugv.ttl");
+    read(domain, problem, &format!("[knowledge]\nfiles = ['{}']", knowledge.display()), sections)
+}
+
+/// Returns a loop, not started, for this domain and problem without a knowledge base.
+pub fn plain(domain: &str, problem: &str) -> Loop {
+    read(domain, problem, "[knowledge]\nfiles = []", "")
+}
+
+fn read(domain: &str, problem: &str, knowledge: &str, sections: &str) -> Loop {
+    let directory = tempfile::tempdir().expect("a directory");
+    for (name, text) in [("domain.pddl", domain), ("problem.pddl", problem)] {
+        std::fs::write(directory.path().join(name), text).expect("a file");
+    }
+    let manifest = format!(
+        "name = 'own'\n{knowledge}\n[planning]\ndomain = 'domain.pddl'\nproblem = 'problem.pddl'\n{sections}\n"
+    );
+    let setup = Setup::parse("m.toml", &manifest, directory.path());
+    let Setup { mission, settings, .. } = setup.expect("the mission is read");
+    Loop::new(mission, settings).expect("a loop")
+}
+
+/// Returns the kinds of the answers.
+pub fn kinds(answers: &[Answer]) -> Vec<String> {
+    answers.iter().map(|answer| answer.to_json()["answer"].as_str().expect("a kind").to_owned()).collect()
+}

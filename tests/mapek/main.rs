@@ -18,6 +18,7 @@ mod noise;
 mod numbers;
 mod reaction;
 mod receipts;
+mod remainder;
 mod runaway;
 mod soak;
 mod worlds;

@@ -9,7 +9,7 @@ use cpu_time::ThreadTime;
 use metaplan::mapek::{Answer, Command, Loop, Observation, ParallelSearch, SafeReaction, Settings};
 use metaplan::setup::Setup;
 
-use crate::common::{control, feed};
+use crate::common::{control, feed, kinds, own};
 
 fn with(settings: impl Fn(Settings) -> Settings) -> Loop {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
@@ -21,31 +21,9 @@ fn with(settings: impl Fn(Settings) -> Settings) -> Loop {
     control
 }
 
-/// Returns a loop, not started, for the knowledge base of the UGV with this domain and problem. `sections` end its
-/// manifest.
-fn own(domain: &str, problem: &str, sections: &str) -> Loop {
-    let directory = tempfile::tempdir().expect("a directory");
-    for (name, text) in [("domain.pddl", domain), ("problem.pddl", problem)] {
-        std::fs::write(directory.path().join(name), text).expect("a file");
-    }
-    let knowledge = Path::new(env!("CARGO_MANIFEST_DIR")).join("ontology/kb/ugv.ttl");
-    let manifest = format!(
-        "name = 'own'\n[knowledge]\nfiles = ['{}']\n[planning]\ndomain = 'domain.pddl'\n\
-         problem = 'problem.pddl'\n{sections}\n",
-        knowledge.display()
-    );
-    let setup = Setup::parse("m.toml", &manifest, directory.path());
-    let Setup { mission, settings, .. } = setup.expect("the mission is read");
-    Loop::new(mission, settings).expect("a loop")
-}
-
 fn react(control: &mut Loop, line: &str) -> Vec<Answer> {
     let now = control.beliefs().now() + Duration::from_millis(100);
     control.react(&Observation::parse(line), now)
-}
-
-fn kinds(answers: &[Answer]) -> Vec<String> {
-    answers.iter().map(|answer| answer.to_json()["answer"].as_str().expect("a kind").to_owned()).collect()
 }
 
 fn status(component: &str, status: &str) -> String {
