@@ -330,8 +330,8 @@ impl Whole<'_> {
         withdrawn
     }
 
-    /// Returns the reason why an objective cannot have a design beside the chosen designs of the others, those that
-    /// stay, and `unserved`, the present designs of other objectives without a choice.
+    /// Returns the reason why an objective cannot have a design together with the chosen designs of other objectives,
+    /// those that stay, and `unserved`, the present designs of other objectives without a choice.
     fn conflict(&self, at: usize, offer: &Offer, unserved: &[&Offer]) -> Option<String> {
         let chosen_elsewhere =
             self.needing.iter().zip(self.designs).enumerate().filter(|(other, _)| *other != at);

@@ -10,7 +10,7 @@
 //! effects, and in its duration. The action reads the value without these changes. Therefore, each such function `F`
 //! has a companion function `metaplan_done_F`, which contains the change of each value so far, and the copy reads
 //! `F - metaplan_done_F`. Past increases at start are part of the values that conditions and effects at the end read.
-//! So the copy removes these increases from the companion at its start.
+//! Therefore, the copy removes these increases from the companion at its start.
 //!
 //! The past changes were made with the designs of the past. With other designs, the amounts may differ. A condition such
 //! as a sufficient battery level is then about the remaining share of the new amounts. Therefore, conditions read the

@@ -322,26 +322,6 @@ fn an_action_of_duration_zero_is_not_interrupted() {
     assert_eq!(kinds(&answers), ["request_action"], "{answers:?}");
 }
 
-#[test]
-fn a_preference_about_the_trajectory_allows_plans_during_an_action() {
-    let domain =
-        "(define (domain d) (:requirements :typing :constraints :preferences :durative-actions :fluents)
-      (:types place) (:predicates (at ?p - place) (road ?a ?b - place)) (:functions (wind))
-      (:durative-action go :parameters (?a ?b - place) :duration (= ?duration 1)
-        :condition (and (at start (at ?a)) (over all (road ?a ?b)))
-        :effect (and (at start (not (at ?a))) (at end (at ?b)))))";
-    let problem = "(define (problem p) (:domain d) (:objects a b c d - place)
-      (:init (= (wind) 0) (at a) (road a b) (road b c) (road c d)) (:goal (at d))
-      (:constraints (preference p1 (sometime (at b))))
-      (:metric minimize (+ (total-time) (* 10 (is-violated p1)))))";
-    let mut control = own(domain, problem, "[adaptation]\nsettle = 0");
-    control.start();
-    feed(&mut control, r#"{"event":"action_progress","action":1,"fraction":0.5}"#);
-    let answers = feed(&mut control, r#"{"event":"fact_changed","name":"wind","value":1}"#);
-    let because = "it is still the best".to_owned();
-    assert!(answers.contains(&Answer::PlanKept { because }), "{answers:?}");
-}
-
 /// Start and end of a movement.
 fn places(step: &PlannedStep) -> [String; 2] {
     let places: Vec<String> =

@@ -102,7 +102,7 @@ fn traces_follow_links_and_write_to_fifos() {
     assert!(link.symlink_metadata().expect("a link").is_symlink());
 }
 
-/// As many links as Linux follows are followed.
+/// The program follows chains of the length that Linux follows.
 #[test]
 fn long_chains_of_links_are_followed() {
     let folder = tempfile::tempdir().expect("a folder");

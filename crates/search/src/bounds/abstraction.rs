@@ -174,9 +174,9 @@ impl Abstraction {
             }
             for (source, operator) in self.incoming(state) {
                 let through = distance.saturating_add(costs[*operator as usize]).min(MAX_DISTANCE);
-                let known = &mut distances[*source as usize];
-                if through < *known {
-                    *known = through;
+                let best = &mut distances[*source as usize];
+                if through < *best {
+                    *best = through;
                     scratch.queue.push(Reverse((through, *source)));
                 }
             }

@@ -247,8 +247,8 @@ impl<'a> Refinement<'a> {
             }
             if self.is_goal(state) {
                 for expanded in closed {
-                    let rest = total.saturating_sub(costs[expanded as usize]);
-                    self.to_go[expanded as usize] = self.to_go[expanded as usize].max(rest);
+                    let cost_to_go = total.saturating_sub(costs[expanded as usize]);
+                    self.to_go[expanded as usize] = self.to_go[expanded as usize].max(cost_to_go);
                 }
                 return Ok(Some(self.path_to(state, &parents)));
             }
@@ -289,9 +289,9 @@ impl<'a> Refinement<'a> {
         for edge in plan {
             let operator = &task.operators[edge.operator as usize];
             self.work += WORK_PER_VISIT / 4 * values.len() as u64;
-            let violated = self.violated(&operator.condition.facts, &values, state);
-            if !violated.is_empty() {
-                return self.most_refined(violated);
+            let conditions = &operator.condition.facts;
+            if conditions.iter().any(|fact| self.is_basic(*fact) && !fact.holds(&values)) {
+                return self.most_refined(self.violated(conditions, &values, state));
             }
             let next = apply(operator, &values);
             let mut candidates = Vec::new();
@@ -307,12 +307,21 @@ impl<'a> Refinement<'a> {
             }
             (values, state) = (next, edge.state);
         }
+        // A state with an unreachable fact is a goal state, too.
+        if self.subtask.unreachable.iter().any(|fact| fact.holds(&values)) {
+            return None;
+        }
         self.most_refined(self.violated(&self.subtask.goals, &values, state))
     }
 
-    /// Returns the splits that separate `values` from the states in which the violated facts hold.
+    /// Returns the splits that separate `values` from the states in which the violated facts hold. A fact that
+    /// the abstract state does not contain yields no split.
     fn violated(&self, facts: &[Fact], values: &[u32], state: u32) -> Vec<Flaw> {
-        let violated = facts.iter().filter(|fact| self.is_basic(**fact) && !fact.holds(values));
+        let is_separable = |fact: &&Fact| {
+            let is_violated = self.is_basic(**fact) && !fact.holds(values);
+            is_violated && self.contains(state, fact.variable.index(), fact.value)
+        };
+        let violated = facts.iter().filter(is_separable);
         violated
             .map(|fact| Flaw { state, variable: fact.variable.index(), values: vec![fact.value] })
             .collect()
@@ -511,11 +520,11 @@ impl<'a> Refinement<'a> {
 
 /// Removes the transitions to or from `state` from the lists of the states at the other ends of `edges`.
 fn remove_edges(lists: &mut [Vec<Edge>], edges: &[Edge], state: u32) {
-    let mut others: Vec<u32> = edges.iter().map(|edge| edge.state).collect();
-    others.sort_unstable();
-    others.dedup();
-    for other in others {
-        lists[other as usize].retain(|edge| edge.state != state);
+    let mut neighbours: Vec<u32> = edges.iter().map(|edge| edge.state).collect();
+    neighbours.sort_unstable();
+    neighbours.dedup();
+    for neighbour in neighbours {
+        lists[neighbour as usize].retain(|edge| edge.state != state);
     }
 }
 

@@ -96,9 +96,9 @@ impl OnlineCostPartitioning {
         let subtasks = subtasks(context)?;
         let count = subtasks.len();
         for (subtask, position) in subtasks.iter().zip(0..) {
-            let others = count - position;
-            let share = max_work.saturating_sub(work) / others as u64;
-            let refinement = RefinementLimits { transitions: remaining / others, work: share };
+            let remaining_count = count - position;
+            let share = max_work.saturating_sub(work) / remaining_count as u64;
+            let refinement = RefinementLimits { transitions: remaining / remaining_count, work: share };
             let (abstraction, used) =
                 cartesian_abstraction(context, &costs, &by_effect, subtask, refinement)?;
             remaining = remaining.saturating_sub(abstraction.size());
@@ -340,9 +340,9 @@ fn stolen_costs(
     let stolen = |(abstraction, distances): (&Abstraction, &Vec<u32>)| {
         let mut sum = 0;
         abstraction.saturate(distances, scratch, |operator, used| {
-            let others = needed[operator] - u64::from(used);
+            let needed_elsewhere = needed[operator] - u64::from(used);
             let missing = needed[operator].saturating_sub(u64::from(costs[operator]));
-            sum += u64::from(used).min(others).min(missing);
+            sum += u64::from(used).min(needed_elsewhere).min(missing);
         });
         sum
     };
