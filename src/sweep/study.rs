@@ -523,7 +523,7 @@ mod tests {
     fn files_with_placeholders_belong_to_the_digest() {
         let folder = tempfile::tempdir().expect("a directory");
         let write = |name: &str, text: &str| {
-            std::fs::write(folder.path().join(name), text).expect("it can be written")
+            std::fs::write(folder.path().join(name), text).expect("it can be written");
         };
         let digest = || Study::read(&folder.path().join("study.toml")).expect("a study").digest;
         write("study.toml", TEXT);
