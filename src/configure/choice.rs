@@ -69,9 +69,9 @@ pub struct Choice {
     pub before: Option<String>,
     /// The chosen design, by local name; `None` if no design was chosen.
     pub design: Option<String>,
-    /// `true` if no design was chosen and the objective cannot keep its present design either: other objectives need
+    /// Reason why the objective cannot keep its present design either, if no design was chosen: other objectives need
     /// its components or its share of a budget.
-    pub withdrawn: bool,
+    pub withdrawn: Option<String>,
     /// All designs of the function, the preferred ones first: fewest missed requirements, then greatest utility.
     pub considered: Vec<Considered>,
 }
@@ -201,7 +201,7 @@ pub(super) fn choose(
     };
     let withdrawn = whole.withdrawn();
     let choices = (0..needing.len())
-        .map(|at| Choice { withdrawn: withdrawn.contains(&at), ..whole.choice(at) })
+        .map(|at| Choice { withdrawn: withdrawn.get(&at).cloned(), ..whole.choice(at) })
         .collect();
     Ok(Configuration { choices, utility: chosen.utility, optimal: chosen.optimal })
 }
@@ -290,7 +290,7 @@ impl Whole<'_> {
             need: need(group),
             before: group.current().map(ToOwned::to_owned),
             design: self.designs[at].map(|position| group.candidates[position].design.clone()),
-            withdrawn: false,
+            withdrawn: None,
             considered: considered.collect(),
         }
     }
@@ -314,17 +314,19 @@ impl Whole<'_> {
         Verdict::Together(conflict.unwrap_or_else(limit))
     }
 
-    /// Returns the objectives without a choice whose present designs conflict with the other designs in use.
-    fn withdrawn(&self) -> BTreeSet<usize> {
-        let (mut withdrawn, mut unserved) = (BTreeSet::new(), Vec::new());
+    /// Returns the objectives without a choice whose present designs conflict with the other designs in use, with the
+    /// reasons.
+    fn withdrawn(&self) -> BTreeMap<usize, String> {
+        let (mut withdrawn, mut unserved) = (BTreeMap::new(), Vec::new());
         for (at, group) in self.needing.iter().enumerate().filter(|(at, _)| self.designs[*at].is_none()) {
             let current =
                 group.candidates.iter().find(|offer| Some(offer.design.as_str()) == group.current());
             let Some(current) = current else { continue };
-            if self.conflict(at, current, &unserved).is_some() {
-                withdrawn.insert(at);
-            } else {
-                unserved.push(current);
+            match self.conflict(at, current, &unserved) {
+                Some(reason) => {
+                    withdrawn.insert(at, reason);
+                }
+                None => unserved.push(current),
             }
         }
         withdrawn

@@ -168,7 +168,7 @@ impl Configurator {
         let objective = choice.objective.as_str();
         let Some(design) = &choice.design else {
             self.pending.insert(objective.to_owned());
-            return if choice.withdrawn {
+            return if choice.withdrawn.is_some() {
                 self.change(|runtime| runtime.unground(objective))
             } else {
                 Ok(())

@@ -377,7 +377,9 @@ impl Keeper {
     ) -> KeeperAnswer {
         self.effects += 1;
         // A failure of an earlier change must not bring the design before it back.
-        self.pending_changes.retain(|_, change| change.objective != objective);
+        for change in self.pending_changes.values_mut().filter(|change| change.objective == objective) {
+            change.from = None;
+        }
         let reconfigure = Service::Reconfigure {
             objective: objective.to_owned(),
             function,
@@ -408,7 +410,7 @@ impl Keeper {
             Err(message) => answers.push(wrong(&message)),
             Ok(mut configuration) => {
                 // Components are released before others use them.
-                configuration.choices.sort_by_key(|choice| !choice.withdrawn);
+                configuration.choices.sort_by_key(|choice| choice.withdrawn.is_none());
                 for choice in configuration.choices {
                     self.adopt(&choice, configuration.optimal, answers);
                 }
@@ -425,10 +427,8 @@ impl Keeper {
         }
         let Some(design) = &choice.design else {
             let because = reasons_of(choice);
-            if choice.withdrawn
-                && let Some(design) = &choice.before
-            {
-                let reasons = (because.clone(), optimal);
+            if let (Some(conflict), Some(design)) = (&choice.withdrawn, &choice.before) {
+                let reasons = ([&because[..], &[format!("{design}: {conflict}")]].concat(), optimal);
                 answers.push(self.withdraw(&objective, function.clone(), design, reasons));
             }
             // Unchanged reasons are not reported again.

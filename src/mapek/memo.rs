@@ -11,6 +11,7 @@ use pddl::ast::{Atom, InitialElement, Problem, Term};
 
 use crate::mapek::ask::{Outcome, Question};
 use crate::mapek::beliefs::Running;
+use crate::mapek::resume::has_reached_facts;
 use crate::mapek::step::PlannedStep;
 
 const CAPACITY: usize = 16;
@@ -67,6 +68,13 @@ impl StoredQuestion {
         self.running.as_ref().map(|running| running.action) == question.running.map(|running| running.action)
     }
 
+    /// Returns `false` if only one of the actions under way is known to have started, and plans depend on this.
+    fn has_equal_start(&self, question: &Question<'_>) -> bool {
+        let (Some(stored), Some(running)) = (&self.running, question.running) else { return true };
+        stored.started == running.started
+            || !has_reached_facts(question.mission.domain(), &running.step, question.problem)
+    }
+
     pub(super) fn equals(&self, question: &Question<'_>) -> bool {
         let (left, right) = (&self.problem, question.problem);
         let objects = |problem: &Problem| problem.objects.len();
@@ -75,6 +83,7 @@ impl StoredQuestion {
             && self.goal.as_deref() == question.goal
             && self.running.as_ref().map(relevant_part) == question.running.map(relevant_part)
             && self.old.as_deref() == question.old.filter(|_| question.stay_close)
+            && self.has_equal_start(question)
             && left.init.iter().zip(&right.init).all(|(left, right)| are_equal(left, right))
             && left.objects.iter().zip(&right.objects).all(|(left, right)| {
                 let types = left.r#type.alternatives.iter().map(|name| &name.name);
@@ -85,8 +94,8 @@ impl StoredQuestion {
 }
 
 /// Returns the parts of an action under way on which plans depend: not the numbers of the action and of its request.
-fn relevant_part(running: &Running) -> (&PlannedStep, &BigRational, &BTreeMap<String, BigRational>, bool) {
-    (&running.step, &running.progress, &running.applied, running.started)
+fn relevant_part(running: &Running) -> (&PlannedStep, &BigRational, &BTreeMap<String, BigRational>) {
+    (&running.step, &running.progress, &running.applied)
 }
 
 fn are_equal(left: &InitialElement, right: &InitialElement) -> bool {

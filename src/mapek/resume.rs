@@ -8,7 +8,7 @@
 //!
 //! The copy may read a value that the progress of the action has already changed: in conditions, in the amounts of its
 //! effects, and in its duration. The action reads the value without these changes. Therefore, each such function `F`
-//! has a companion function `metaplan_done_F`, which contains the change of each value so far, and the copy reads
+//! has a companion function `metaplan_done_F`, which contains the past change of each value, and the copy reads
 //! `F - metaplan_done_F`. Past increases at start are part of the values that conditions and effects at the end read.
 //! Therefore, the copy removes these increases from the companion at its start.
 //!
@@ -79,11 +79,13 @@ pub(crate) fn resume<'p>(
     for schema in schemas(domain, remainder.step) {
         let mut copy = schema.clone();
         let functions = functions_to_restore(schema, &gradual, remainder);
-        if remainder.has_started && has_reached_facts(schema, remainder.step, &problem) {
-            waive_start_conditions(&mut copy);
+        if remainder.has_started
+            && let Some(facts) = reached_facts(schema, remainder.step, &problem)
+        {
+            waive_start_conditions(&mut copy, remainder.step, &facts);
         }
         let mut shortening = Shortening::new(remainder.progress, &gradual, &functions);
-        shortening.compare_designs(schema, remainder.step);
+        shortening.compare_designs(schema, remainder);
         shortening.shorten(&mut copy);
         restored.extend(functions);
         for (parameter, value) in schema.parameters.iter().zip(&context) {
@@ -218,42 +220,60 @@ fn state_changes(problem: &mut Problem, restored: &BTreeSet<Name>, applied: &BTr
     problem.init.extend(companions);
 }
 
-/// Returns `true` if the facts in the state of `problem` already are those after the action, which changes at least one
-/// fact. Returns `false` if changes of facts are conditional or quantified.
-fn has_reached_facts(schema: &Action, step: &PlannedStep, problem: &Problem) -> bool {
-    let parameters = schema.parameters.iter().map(|parameter| &parameter.identifier.name);
-    let arguments: BTreeMap<&Name, Name> =
-        parameters.zip(step.arguments.iter().map(|argument| Name::new(argument))).collect();
+/// Returns `true` if the state of `problem` already has all changes of facts by the action.
+pub(super) fn has_reached_facts(domain: &Domain, step: &PlannedStep, problem: &Problem) -> bool {
+    schemas(domain, step).any(|schema| reached_facts(schema, step, problem).is_some())
+}
+
+/// A ground atom.
+type GroundFact = (Name, Vec<Name>);
+
+/// Returns the atom with the arguments of a step.
+fn ground(atom: &Atom, schema: &Action, step: &PlannedStep) -> GroundFact {
     let value = |term: &Term| match term {
-        Term::Variable(variable) => arguments.get(&variable.name).unwrap_or(&variable.name).clone(),
+        Term::Variable(variable) => {
+            let position = schema.parameters.iter().position(|p| p.identifier.name == variable.name);
+            position.map_or_else(|| variable.name.clone(), |position| Name::new(&step.arguments[position]))
+        }
         Term::Constant(constant) => constant.name.clone(),
     };
-    let ground =
-        |atom: &Atom| (atom.predicate.name.clone(), atom.arguments.iter().map(value).collect::<Vec<_>>());
+    (atom.predicate.name.clone(), atom.arguments.iter().map(value).collect())
+}
+
+/// Returns the facts that the action changes if the state of `problem` already has all these changes. Returns `None` if
+/// it has not, if the action changes no facts, or if changes of facts are conditional or quantified.
+fn reached_facts(schema: &Action, step: &PlannedStep, problem: &Problem) -> Option<BTreeSet<GroundFact>> {
     let (mut added, mut deleted) = (BTreeSet::new(), BTreeSet::new());
     let mut parts: Vec<&Effect> = schema.body.effects().collect();
     while let Some(part) = parts.pop() {
         match part {
             Effect::And(subeffects) => parts.extend(subeffects),
             Effect::Add(atom) => {
-                added.insert(ground(atom));
+                added.insert(ground(atom, schema, step));
             }
             Effect::Delete(atom) => {
-                deleted.insert(ground(atom));
+                deleted.insert(ground(atom, schema, step));
             }
-            Effect::ForAll(..) | Effect::When(..) if !changed_predicates(part).is_empty() => return false,
+            Effect::ForAll(..) | Effect::When(..) if !changed_predicates(part).is_empty() => return None,
             _ => {}
         }
     }
     deleted.retain(|fact| !added.contains(fact));
-    let mut missing = added.clone();
-    for fact in problem.init.iter().filter_map(InitialElement::fact) {
+    let changed: BTreeSet<GroundFact> = added.union(&deleted).cloned().collect();
+    let predicates: BTreeSet<&Name> = changed.iter().map(|(predicate, _)| predicate).collect();
+    let mut missing = added;
+    for element in &problem.init {
+        let InitialElement::Fact(atom) = element else { continue };
+        if !predicates.contains(&atom.predicate.name) {
+            continue;
+        }
+        let fact = element.fact()?;
         if deleted.contains(&fact) {
-            return false;
+            return None;
         }
         missing.remove(&fact);
     }
-    missing.is_empty() && !(added.is_empty() && deleted.is_empty())
+    (missing.is_empty() && !changed.is_empty()).then_some(changed)
 }
 
 fn changed_predicates(effect: &Effect) -> BTreeSet<Name> {
@@ -267,31 +287,33 @@ fn changed_predicates(effect: &Effect) -> BTreeSet<Name> {
 }
 
 /// Removes the start conditions about facts that the action itself changes.
-fn waive_start_conditions(action: &mut Action) {
-    let predicates: BTreeSet<Name> = action.body.effects().flat_map(changed_predicates).collect();
+fn waive_start_conditions(action: &mut Action, step: &PlannedStep, facts: &BTreeSet<GroundFact>) {
+    let schema = action.clone();
+    let is_changed = |atom: &Atom| facts.contains(&ground(atom, &schema, step));
     match &mut action.body {
-        ActionBody::Instantaneous { precondition, .. } => waive(precondition, &predicates),
+        ActionBody::Instantaneous { precondition, .. } => waive(precondition, &is_changed),
         ActionBody::Durative { conditions, .. } => {
             for (_, condition) in conditions.iter_mut().filter(|(time, _)| *time == ConditionTime::AtStart) {
-                waive(condition, &predicates);
+                waive(condition, &is_changed);
             }
         }
     }
 }
 
-fn waive(condition: &mut Condition, predicates: &BTreeSet<Name>) {
-    if let Condition::And(parts) = condition {
-        for part in parts {
-            waive(part, predicates);
+/// Removes the conjuncts that are literals of changed facts.
+fn waive(condition: &mut Condition, is_changed: &impl Fn(&Atom) -> bool) {
+    let is_waived = match condition {
+        Condition::And(parts) => {
+            for part in parts {
+                waive(part, is_changed);
+            }
+            false
         }
-        return;
-    }
-    let (mut is_about, mut is_numeric) = (false, false);
-    condition.walk(&mut |node| {
-        is_about |= node.atom().is_some_and(|atom| predicates.contains(&atom.predicate.name));
-        is_numeric |= matches!(node, Node::Condition(Condition::Compare(..)));
-    });
-    if is_about && !is_numeric {
+        Condition::Atom(atom) => is_changed(atom),
+        Condition::Not(inner) => matches!(&**inner, Condition::Atom(atom) if is_changed(atom)),
+        _ => false,
+    };
+    if is_waived {
         *condition = Condition::And(Vec::new());
     }
 }
@@ -306,7 +328,8 @@ struct Shortening<'a> {
     gradual: &'a BTreeSet<Name>,
     /// Functions with companions.
     restored: &'a BTreeSet<Name>,
-    /// Changed values, each with its change by the whole action minus the change with the present designs.
+    /// Changed values, each with its change by the whole action minus the change, extrapolated to the whole action, that
+    /// the progress has made.
     differences: Vec<(Atom, Expression)>,
 }
 
@@ -317,8 +340,9 @@ impl<'a> Shortening<'a> {
         Self { progress, remaining_share, time_left, gradual, restored, differences: Vec::new() }
     }
 
-    /// Collects the differences between the changes with open designs and those with the designs of `step`.
-    fn compare_designs(&mut self, schema: &Action, step: &PlannedStep) {
+    /// Collects the differences between the changes with open designs and those that the progress has made.
+    fn compare_designs(&mut self, schema: &Action, remainder: &Remainder<'_>) {
+        let step = remainder.step;
         let context = step.context();
         let parameters = schema.parameters.iter().zip(&step.arguments).zip(&context);
         let designs: BTreeMap<&Name, &String> = parameters
@@ -328,29 +352,66 @@ impl<'a> Shortening<'a> {
         if self.progress.is_zero() || designs.is_empty() {
             return;
         }
+        let (changes, conditional) = self.changes(schema);
+        for (target, is_increase, open) in &changes {
+            let is_same_function = |atom: &Atom| atom.predicate.name == target.predicate.name;
+            let of_function = || changes.iter().filter(|(other, ..)| is_same_function(other));
+            let is_only_target = of_function().all(|(other, ..)| is_same(other, target));
+            let signed = |open: &Expression, is_increase: bool| {
+                if is_increase {
+                    open.clone()
+                } else {
+                    product(&BigRational::from_integer((-1).into()), open.clone())
+                }
+            };
+            let Some(present) = with_designs(open, &designs) else { continue };
+            let whole_change = ground_text(target, schema, step, &designs)
+                .filter(|_| is_only_target && !conditional.contains(&target.predicate.name));
+            let Some(text) = whole_change else {
+                let difference = vec![signed(open, *is_increase), signed(&present, !*is_increase)];
+                let difference = Expression::Operation(Arithmetic::Add, difference, Span::default());
+                self.differences.push((target.clone(), difference));
+                continue;
+            };
+            // One difference for all changes of this value. The progress may have been made with other designs than the
+            // present ones, so the changes that it has made are constants.
+            if self.differences.iter().any(|(other, _)| is_same(other, target)) {
+                continue;
+            }
+            let mut sum: Vec<Expression> =
+                of_function().map(|(_, is_increase, open)| signed(open, *is_increase)).collect();
+            let applied = remainder.applied.get(&text).cloned().unwrap_or_default();
+            sum.push(Expression::Number(-applied / self.progress, Span::default()));
+            let difference = Expression::Operation(Arithmetic::Add, sum, Span::default());
+            self.differences.push((target.clone(), difference));
+        }
+    }
+
+    /// Returns the unconditional changes of gradual functions: target, whether it is increased, and amount. Also returns
+    /// the functions that conditional and quantified effects change.
+    fn changes(&self, schema: &Action) -> (Vec<(Atom, bool, Expression)>, BTreeSet<Name>) {
         let whole =
             schema.body.durations().iter().find(|constraint| constraint.operator == Comparison::Equal);
+        let (mut changes, mut conditional) = (Vec::new(), BTreeSet::new());
         let mut parts: Vec<&Effect> = schema.body.effects().collect();
         while let Some(part) = parts.pop() {
             match part {
                 Effect::And(subeffects) => parts.extend(subeffects),
+                Effect::ForAll(..) | Effect::When(..) => conditional.extend(changed_functions(part)),
                 Effect::Assign(kind, target, value, _) if self.gradual.contains(&target.predicate.name) => {
                     let mut open = value.clone();
-                    open.change_leaves(&mut |leaf| match (&*leaf, whole) {
-                        (Expression::Duration(_), Some(whole)) => leaf.clone_from(&whole.expression),
-                        _ => self.restore(leaf),
+                    open.change_leaves(&mut |leaf| {
+                        if let (Expression::Duration(_), Some(whole)) = (&*leaf, whole) {
+                            leaf.clone_from(&whole.expression);
+                        }
                     });
-                    if let Some(present) = with_designs(&open, &designs) {
-                        let (left, right) =
-                            if *kind == Assignment::Increase { (open, present) } else { (present, open) };
-                        let difference =
-                            Expression::Operation(Arithmetic::Subtract, vec![left, right], Span::default());
-                        self.differences.push((target.clone(), difference));
-                    }
+                    open.change_leaves(&mut |leaf| self.restore(leaf));
+                    changes.push((target.clone(), *kind == Assignment::Increase, open));
                 }
                 _ => {}
             }
         }
+        (changes, conditional)
     }
 
     /// Scales the duration, increases and decreases of an action to the remaining share, and restores the values that
@@ -422,7 +483,7 @@ impl<'a> Shortening<'a> {
         }
     }
 
-    /// Subtracts the changes so far from a value that a condition of the copy reads, as if they had been made with the
+    /// Subtracts the past changes from a value that a condition of the copy reads, as if they had been made with the
     /// designs of the copy.
     fn restore_in_condition(&self, leaf: &mut Expression) {
         let Expression::Fluent(atom) = &*leaf else { return };
@@ -436,7 +497,7 @@ impl<'a> Shortening<'a> {
         }
     }
 
-    /// Subtracts the changes so far from a value that the copy reads.
+    /// Subtracts the past changes from a value that the copy reads.
     fn restore(&self, leaf: &mut Expression) {
         if let Expression::Fluent(atom) = leaf
             && self.restored.contains(&atom.predicate.name)
@@ -447,7 +508,27 @@ impl<'a> Shortening<'a> {
     }
 }
 
-/// Replaces open designs by the present ones. Returns `None` if there are none, or if the value depends on a chosen
+/// Returns the function with the arguments of a step, without parentheses. `None` if an argument is an open design.
+fn ground_text(
+    target: &Atom,
+    schema: &Action,
+    step: &PlannedStep,
+    designs: &BTreeMap<&Name, &String>,
+) -> Option<String> {
+    let mut text = target.predicate.name.to_string();
+    for term in &target.arguments {
+        let name = term.name();
+        if designs.contains_key(name) {
+            return None;
+        }
+        let position = schema.parameters.iter().position(|parameter| parameter.identifier.name == *name);
+        text.push(' ');
+        text += &position.map_or_else(|| name.to_string(), |position| step.arguments[position].clone());
+    }
+    Some(text)
+}
+
+/// Replaces open designs by the present ones. Returns `None` if no design is open, or if the value depends on a chosen
 /// duration, which is unknown for the present designs.
 fn with_designs(expression: &Expression, designs: &BTreeMap<&Name, &String>) -> Option<Expression> {
     let mut present = expression.clone();

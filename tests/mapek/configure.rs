@@ -299,6 +299,8 @@ fn a_design_that_cannot_be_kept_is_withdrawn() {
         [("o1", close, None), ("o2", Some("fd_push"), firm)],
         "{answers:?}"
     );
+    let reason = "fd_look_close: fd_grasp_firm uses c_arm, which only one design can use";
+    assert!(format!("{answers:?}").contains(reason), "{answers:?}");
     // The arm is in use, so the design does not come back; another design of the other objective releases the arm.
     assert_eq!(reconfigurations(&deliver(&mut keeper, &design("fd_look_close", true))), []);
     deliver(&mut keeper, &design("fd_push", true));

@@ -322,6 +322,27 @@ fn an_action_of_duration_zero_is_not_interrupted() {
     assert_eq!(kinds(&answers), ["request_action"], "{answers:?}");
 }
 
+/// The rest of an action is judged by the designs that it will have, whichever designs made the progress.
+#[test]
+fn a_design_that_changes_during_an_action_can_continue_it() {
+    let mut ugv = control("ugv");
+    ugv.start();
+    for line in [
+        r#"{"event":"goal_changed","goal":"(robot_at wp2)"}"#,
+        r#"{"event":"fact_changed","name":"battery","value":3.5}"#,
+        r#"{"event":"action_started","action":1}"#,
+        r#"{"event":"action_progress","action":1,"fraction":0.5}"#,
+    ] {
+        feed(&mut ugv, line);
+    }
+    let answers = feed(&mut ugv, r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#);
+    let kinds = kinds(&answers);
+    assert!(kinds.contains(&"reconfigure".to_owned()), "{answers:?}");
+    assert!(!kinds.contains(&"suspend_action".to_owned()), "{answers:?}");
+    assert!(!kinds.contains(&"cancel_action".to_owned()), "{answers:?}");
+    assert_eq!(ugv.beliefs().violation(), None, "{answers:?}");
+}
+
 /// Start and end of a movement.
 fn places(step: &PlannedStep) -> [String; 2] {
     let places: Vec<String> =

@@ -15,7 +15,7 @@
 //!
 //! [1] OWL 2 Web Ontology Language, Mapping to RDF Graphs, W3C 2012.
 
-use oxrdf::{NamedNode, NamedOrBlankNode, Term};
+use oxrdf::{NamedNode, NamedOrBlankNode, Term, Triple};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::graph::{Graph, is_type, subject_of};
@@ -219,7 +219,7 @@ fn name_ranges(graph: &mut Graph) {
         let lists = [owl::UNION_OF, owl::INTERSECTION_OF].map(|predicate| graph.objects(&node, predicate));
         for list in lists.into_iter().flatten().filter_map(|head| graph.list(head).ok()) {
             cells.extend(list.spine.into_iter().filter(|&index| {
-                let is_nested = |triple: &oxrdf::Triple| {
+                let is_nested = |triple: &Triple| {
                     triple.predicate.as_str() == rdf::FIRST && matches!(triple.object, Term::BlankNode(_))
                 };
                 graph.get(index).is_some_and(is_nested)
@@ -242,15 +242,13 @@ fn name_ranges(graph: &mut Graph) {
 /// Replaces `p owl:inverseOf [ owl:inverseOf q ]` and `[ owl:inverseOf q ] owl:inverseOf p` by `p
 /// owl:equivalentProperty q`, and `[ owl:inverseOf q ] owl:inverseOf [ owl:inverseOf p ]` by `q owl:inverseOf p`.
 fn replace_double_inverses(graph: &mut Graph) {
-    let inverses = |graph: &Graph, node: &NamedOrBlankNode| -> Vec<(usize, Term)> {
-        let triples = graph.of(node).filter(|(_, triple)| triple.predicate.as_str() == owl::INVERSE_OF);
-        triples.map(|(index, triple)| (index, triple.object.clone())).collect()
-    };
     // The named property whose inverse a blank node is.
     let property_of = |graph: &Graph, node: &Term| {
         let Term::BlankNode(node) = node else { return None };
-        let mut objects = inverses(graph, &node.clone().into()).into_iter().map(|(_, object)| object);
-        objects.find(|object| matches!(object, Term::NamedNode(_)))
+        let node = NamedOrBlankNode::from(node.clone());
+        let mut triples = graph.of(&node).filter(|(_, triple)| triple.predicate.as_str() == owl::INVERSE_OF);
+        let is_named = |(_, triple): &(usize, &Triple)| matches!(triple.object, Term::NamedNode(_));
+        triples.find(is_named).map(|(_, triple)| triple.object.clone())
     };
     let mut axioms = Vec::new();
     for (index, triple) in graph.iter().filter(|(_, triple)| triple.predicate.as_str() == owl::INVERSE_OF) {
@@ -266,7 +264,7 @@ fn replace_double_inverses(graph: &mut Graph) {
         };
         axioms.push((index, axiom));
     }
-    let mut nodes = Vec::new();
+    let mut nodes = FxHashSet::default();
     for (index, (subject, predicate, object)) in axioms {
         let Some(subject) = subject_of(&subject) else { continue };
         if let Some(triple) = graph.take(index) {
@@ -277,7 +275,7 @@ fn replace_double_inverses(graph: &mut Graph) {
         }
         graph.state(&subject, predicate, object);
     }
-    remove_unreferenced(graph, nodes);
+    remove_unreferenced(graph, nodes.into_iter().collect());
 }
 
 /// Removes the triples about blank nodes without a reference. horned-owl would report an inverse as left over.

@@ -102,14 +102,22 @@ impl Resolver {
     }
 
     fn in_catalogs(&self, import: &str, importer: Option<&Path>) -> Result<Option<PathBuf>, Error> {
+        // A faulty catalog next to the document does not matter if a given catalog has the file.
+        if let Some(path) = self.given_target(import).filter(|path| path.is_file()) {
+            return Ok(Some(path));
+        }
         let targets = self.targets(import, importer)?;
         Ok(targets.into_iter().flatten().find(|path| path.is_file()))
+    }
+
+    fn given_target(&self, import: &str) -> Option<PathBuf> {
+        self.catalogs.iter().find_map(|catalog| catalog.resolve(import))
     }
 
     /// Returns the paths that the given catalogs, and the catalog next to the importing document, assign to an
     /// import.
     fn targets(&self, import: &str, importer: Option<&Path>) -> Result<[Option<PathBuf>; 2], Error> {
-        let given = self.catalogs.iter().find_map(|catalog| catalog.resolve(import));
+        let given = self.given_target(import);
         let file = importer.and_then(Path::parent).map(|directory| directory.join(CATALOG));
         let sibling = match file.filter(|file| file.is_file()) {
             Some(file) => catalog(&file)?.resolve(import),

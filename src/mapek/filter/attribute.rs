@@ -262,7 +262,10 @@ impl AttributeFilter {
             crossing.take_if(|crossing| !bound.is_crossed(&target, &crossing.nearest));
         }
         state.believed = Some(target.clone());
-        state.recent.clear();
+        // Samples that have crossed farther bounds still count for these.
+        if state.crossings.iter().all(Option::is_none) {
+            state.recent.clear();
+        }
         state.held = 0;
         Verdict::Accepted(target)
     }

@@ -127,7 +127,7 @@ type History = Vec<(u64, Option<i64>)>;
 
 /// Value in thousandths that is believed at the end of a history, computed from the definition of debouncing for each
 /// bound on its own. A bound changes as soon as all samples of the last `debounce`, and at least `agree` of the last
-/// `of` samples since the last change, lie on its other side. Of the samples that lie in the cell with these changes,
+/// `of` samples since the last change after which no bound was crossed, lie on its other side. Of the samples that lie in the cell with these changes,
 /// the latest one is believed.
 fn believed(history: &History, bounds: &[i64], debounce: u64, agree: usize, of: usize) -> i64 {
     let samples: Vec<(u64, i64)> =
@@ -165,7 +165,10 @@ fn believed(history: &History, bounds: &[i64], debounce: u64, agree: usize, of: 
                 };
                 let latest = past.iter().rev().map(|(_, sample)| *sample).find(is_in_cell);
                 current = latest.expect("a sample that crosses the changed bounds only");
-                first_counted = past.len();
+                // Those that have crossed farther bounds still count for these.
+                if bounds.iter().all(|bound| (last > *bound) == (current > *bound)) {
+                    first_counted = past.len();
+                }
             }
         }
     }

@@ -162,31 +162,36 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 
     /// Returns the duration that the planner chooses, if it has to be chosen. `None` if no constraint bounds it on
-    /// the side that the metric prefers, or if a bound is strict.
+    /// the side that the metric prefers, if such a bound is strict, or if a bound on the other side excludes it.
     fn chosen_duration(&self, bounds: &[(Comparison, BigRational)]) -> Option<BigRational> {
         if !self.options.chosen_durations {
             return None;
         }
-        let is_strict = |(operator, _): &(Comparison, BigRational)| {
-            matches!(operator, Comparison::Greater | Comparison::Less)
-        };
-        if bounds.iter().any(is_strict) {
-            return None;
-        }
         let with_operator =
             |operator| bounds.iter().filter(move |bound| bound.0 == operator).map(|bound| &bound.1);
-        let (lower, upper) =
-            (with_operator(Comparison::GreaterOrEqual).max(), with_operator(Comparison::LessOrEqual).min());
-        let chosen = if self.rewards_time() { upper } else { lower }?;
-        let is_allowed =
-            lower.is_none_or(|lower| lower <= chosen) && upper.is_none_or(|upper| chosen <= upper);
+        let (chosen, strict) = if self.rewards_time() {
+            (with_operator(Comparison::LessOrEqual).min(), Comparison::Less)
+        } else {
+            (with_operator(Comparison::GreaterOrEqual).max(), Comparison::Greater)
+        };
+        let chosen = chosen.filter(|_| with_operator(strict).next().is_none())?;
+        let is_allowed = bounds.iter().all(|(operator, bound)| match operator {
+            Comparison::Equal => chosen == bound,
+            Comparison::Less => chosen < bound,
+            Comparison::LessOrEqual => chosen <= bound,
+            Comparison::Greater => chosen > bound,
+            Comparison::GreaterOrEqual => chosen >= bound,
+        });
         is_allowed.then(|| chosen.clone())
     }
 
     /// Returns `true` if the metric prefers longer plans. The planner requires that the total time has a constant
     /// factor in the metric, so that two total times in one state suffice.
     fn rewards_time(&self) -> bool {
-        let at = |time: i32| metric(self.world, &self.state, &BigRational::from_integer(time.into()));
+        // Violated preferences have no value before the end of the plan; the factor of the time does not depend on them.
+        let complete = self.world.has_preferences().then(|| self.world.with_violations(&[], &self.state));
+        let state = complete.as_ref().unwrap_or(&self.state);
+        let at = |time: i32| metric(self.world, state, &BigRational::from_integer(time.into()));
         let (Some(zero), Some(one)) = (at(0), at(1)) else { return false };
         match self.world.problem.metric.as_ref().map(|metric| metric.direction) {
             Some(Direction::Minimize) => one < zero,

@@ -170,16 +170,19 @@ impl<'a> Refinement<'a> {
     }
 
     fn refine(&mut self, limits: RefinementLimits, pulse: &mut LimitPoll<'_>) -> Result<(), Interrupted> {
-        self.separate_unreachable();
-        while self.transitions < limits.transitions
-            && self.work < limits.work
-            && self.sets.len().saturating_mul(size_of::<u64>()) < MAX_SET_BYTES
-        {
+        self.separate_unreachable(limits, pulse)?;
+        while self.is_within(limits) {
             let Some(plan) = self.abstract_plan(pulse)? else { break };
             let Some(flaw) = self.flaw(&plan) else { break };
             self.split(&flaw);
         }
         Ok(())
+    }
+
+    fn is_within(&self, limits: RefinementLimits) -> bool {
+        self.transitions < limits.transitions
+            && self.work < limits.work
+            && self.sets.len().saturating_mul(size_of::<u64>()) < MAX_SET_BYTES
     }
 
     fn finish(self) -> Abstraction {
@@ -219,15 +222,24 @@ impl<'a> Refinement<'a> {
         self.subtask.goals.iter().all(is_in) || self.subtask.unreachable.iter().any(is_in)
     }
 
-    /// Separates the states that contain a fact of `Subtask::unreachable` from the initial state.
-    fn separate_unreachable(&mut self) {
+    /// Separates the states that contain a fact of `Subtask::unreachable` from the initial state, within the limits.
+    fn separate_unreachable(
+        &mut self,
+        limits: RefinementLimits,
+        pulse: &mut LimitPoll<'_>,
+    ) -> Result<(), Interrupted> {
         for variable in 0..self.task.basic {
+            pulse.beat()?;
+            if !self.is_within(limits) {
+                break;
+            }
             let facts = self.subtask.unreachable.iter().filter(|fact| fact.variable.index() == variable);
             let values: Vec<u32> = facts.map(|fact| fact.value).collect();
             if !values.is_empty() && (values.len() as u64) < u64::from(self.count(self.initial, variable)) {
                 self.split(&Flaw { state: self.initial, variable, values });
             }
         }
+        Ok(())
     }
 
     /// Returns a cheapest abstract plan as operators with the abstract states they lead to; `None` if there is
@@ -254,6 +266,7 @@ impl<'a> Refinement<'a> {
             }
             closed.push(state);
             self.work += WORK_PER_VISIT * (self.outgoing[state as usize].len() as u64 + 2);
+            self.work += self.subtask.unreachable.len() as u64 / 4;
             for edge in &self.outgoing[state as usize] {
                 let through = cost.saturating_add(self.costs[edge.operator as usize]);
                 if through < costs[edge.state as usize] {

@@ -16,7 +16,7 @@
 use num_integer::Integer;
 use task::context::Context;
 use task::limits::{Interrupted, Limits};
-use task::number::Int;
+use task::number::{GROWTH_LIMIT, Int};
 use task::task::Task;
 
 use crate::bounds::abstraction::{Abstraction, MAX_ABSTRACTIONS, MAX_DISTANCE, Scratch, UNREACHABLE};
@@ -28,6 +28,8 @@ use crate::bounds::pattern_database::Projection;
 const MAX_TRANSITIONS: usize = 1_000_000;
 /// Upper limit on the number of transitions of a projection. Greater projections are omitted.
 const MAX_PROJECTION_SIZE: usize = 100_000;
+/// Number of columns of the tables after they have grown for the first time.
+const MIN_STRIDE: usize = 8;
 /// Upper limit on the number of kept cost partitionings.
 const MAX_PARTITIONINGS: usize = 128;
 /// The goal distances of all cost partitionings may take this part of the memory limit of a search, as a divisor.
@@ -181,7 +183,7 @@ impl OnlineCostPartitioning {
             if self.evaluations >= self.next_order {
                 best = best.max(self.try_order(values, best));
             }
-            result = Some(Int::from(best) * self.unit);
+            result = Some(Int::from(best).saturating_mul(self.unit).min(GROWTH_LIMIT));
         }
         self.sums = sums;
         result
@@ -201,7 +203,7 @@ impl OnlineCostPartitioning {
     /// unreachable, and keeps it if it raises the estimate. Returns its estimate.
     fn try_order(&mut self, values: &[u32], estimate: u32) -> u32 {
         let is_full = self.partitionings + 1 >= self.stride
-            && self.rows.saturating_mul(self.stride * 2).saturating_mul(size_of::<u32>())
+            && self.rows.saturating_mul((self.stride * 2).max(MIN_STRIDE)).saturating_mul(size_of::<u32>())
                 > self.limits.room() / TABLE_SHARE;
         if self.partitionings >= MAX_PARTITIONINGS || is_full {
             self.next_order = u64::MAX;
@@ -210,7 +212,10 @@ impl OnlineCostPartitioning {
         self.work += self.order_work;
         let states = self.abstractions.iter().map(|abstraction| abstraction.state(values).0);
         let states: Vec<u32> = states.collect();
-        let Ok((tables, value)) = self.partition(&states) else { return 0 };
+        let Ok((tables, value)) = self.partition(&states) else {
+            self.next_order = u64::MAX;
+            return 0;
+        };
         let is_better = value > estimate;
         self.failures = if is_better { 0 } else { (self.failures + 1).min(10) };
         let pause = (self.order_work * ORDER_SHARE / WORK_PER_EVALUATION).max(1) << self.failures;
@@ -275,7 +280,7 @@ impl OnlineCostPartitioning {
     fn keep(&mut self, columns: &[Vec<u32>]) {
         let (old, column) = (self.stride, self.partitionings + 1);
         if column >= old {
-            self.stride = (old * 2).max(8);
+            self.stride = (old * 2).max(MIN_STRIDE);
             for table in &mut self.tables {
                 let mut wider = vec![0; table.len() / old * self.stride];
                 for (row, to) in table.chunks(old).zip(wider.chunks_mut(self.stride)) {

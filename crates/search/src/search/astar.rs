@@ -272,7 +272,14 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
                 }
             }
             self.store.unpack(id, &mut self.state);
-            let Some((total, ..)) = self.reevaluate(id, key) else { continue };
+            let Some((total, ..)) = self.reevaluate(id, key) else {
+                // Many nodes may be raised in a row, without an expansion that looks at the limits.
+                if pulse.beat().is_err() {
+                    self.is_interrupted = true;
+                    return Some(SearchOutcome::Unknown(self.best_plan()));
+                }
+                continue;
+            };
             if self.expand(id, &total, &mut pulse).is_err() {
                 self.is_interrupted = true;
                 return Some(SearchOutcome::Unknown(self.best_plan()));

@@ -105,8 +105,8 @@ pub fn ground_concurrent(
         info_span!("compile").in_scope(|| compile_away(domain, problem, objectives, semantics, limits))?;
     let source = SourceTask::new(domain, problem, config);
     let config = config.clone().with_objectives(plain.objectives.to_vec());
-    let has_soft_deadlines = !plain.deadlines.is_empty();
-    let task = ground_plain((&plain.domain, &plain.problem, &config, &separation), has_soft_deadlines)?;
+    let has_deadlines = !plain.deadlines.is_empty();
+    let task = ground_plain((&plain.domain, &plain.problem, &config, &separation), has_deadlines)?;
     Ok(ConcurrentTask(match task.0 {
         Width::Narrow(task) => Width::Narrow(Box::new(task.completed(&plain, source.as_ref()))),
         Width::Wide(task) => Width::Wide(Box::new(task.completed(&plain, source.as_ref()))),
@@ -142,7 +142,7 @@ impl<T: TimeNumber> TemporalTask<T> {
 /// durations, `shortest` holds the variant with the shortest durations, if it can be grounded. With
 /// hidden actions (compiled constraints), or if chosen durations are not supported, only the
 /// shortest durations are possible.
-fn ground_plain(files: Files<'_>, has_soft_deadlines: bool) -> Result<ConcurrentTask, Errors> {
+fn ground_plain(files: Files<'_>, has_deadlines: bool) -> Result<ConcurrentTask, Errors> {
     let shortest = ground_with(files, &normalize);
     let is_judged = files.0.actions.iter().any(|action| is_hidden(action.identifier.name.as_str()));
     if shortest.is_ok() && (is_fixed(files.0) || is_judged) {
@@ -151,7 +151,7 @@ fn ground_plain(files: Files<'_>, has_soft_deadlines: bool) -> Result<Concurrent
     match (ground_with(files, &normalize_freely), shortest) {
         // The search for chosen durations does not count violated preferences and deadlines.
         (Ok(ConcurrentTask(Width::Narrow(mut free))), shortest)
-            if free.violations.is_empty() && !has_soft_deadlines =>
+            if free.violations.is_empty() && !has_deadlines =>
         {
             free.is_exact = free.is_exact && flexible_durations::is_exact(&free);
             free.shortest = match shortest {
@@ -160,11 +160,23 @@ fn ground_plain(files: Files<'_>, has_soft_deadlines: bool) -> Result<Concurrent
             };
             Ok(ConcurrentTask(Width::Narrow(free)))
         }
+        (Ok(ConcurrentTask(Width::Narrow(_))), Err(_)) => Err(uncounted_preferences(files.1)),
         // Linear programs for chosen durations support narrow numbers only.
         (Ok(_), shortest) => shortest,
         (Err(_), Ok(shortest)) => Ok(shortest),
         (Err(errors), Err(_)) => Err(errors),
     }
+}
+
+fn uncounted_preferences(problem: &Problem) -> Errors {
+    let span = problem.metric.as_ref().map_or_else(Span::default, |metric| metric.span);
+    vec![Error::Unsupported {
+        construct: "preferences or `always-within` together with effects that depend on a duration that the planner chooses"
+            .into(),
+        instead: "durations that are fixed".into(),
+        place: Place { file: File::Problem, span },
+    }]
+    .into()
 }
 
 type Files<'f> = (&'f Domain, &'f Problem, &'f GroundConfig, &'f Rational);
