@@ -103,11 +103,10 @@ struct DisplayCause<'a> {
 impl fmt::Display for DisplayCause<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.cause {
-            // A label may contain line breaks.
-            Cause::Constraint(RuleIdentity { label: Some(label), .. }) => {
-                f.write_str(&label.replace(['\n', '\r'], " "))
-            }
-            Cause::Constraint(identity) => write!(f, "{identity}"),
+            Cause::Constraint(identity) => match identity.label_line() {
+                Some(label) => f.write_str(&label),
+                None => write!(f, "{identity}"),
+            },
             Cause::IllTyped(literal) => {
                 write!(f, "the datatype of {} forbids its value", self.symbols.value(*literal))
             }
@@ -198,6 +197,7 @@ mod tests {
     #[test]
     fn a_violation_is_one_line() {
         let identity = RuleIdentity { label: Some("first\r\nsecond".into()), ..RuleIdentity::new("file", 0) };
+        assert_eq!(identity.to_string(), "file#0 (first  second)");
         let violation = Violation { cause: Cause::Constraint(identity), supports: Vec::new() };
         assert_eq!(violation.display(&Symbols::default()).to_string(), "first  second");
     }

@@ -144,13 +144,18 @@ impl RuleIdentity {
     pub fn new(source: impl Into<Arc<str>>, position: u32) -> Self {
         Self { source: source.into(), label: None, position }
     }
+
+    /// Returns the label with spaces in place of line breaks.
+    pub(crate) fn label_line(&self) -> Option<String> {
+        self.label.as_ref().map(|label| label.replace(['\n', '\r'], " "))
+    }
 }
 
-/// Formats the identity as `source#position`, followed by the label in parentheses, if there is one.
+/// Formats the identity in one line as `source#position`, followed by the label in parentheses, if there is one.
 impl fmt::Display for RuleIdentity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}#{}", self.source, self.position)?;
-        match &self.label {
+        match self.label_line() {
             Some(label) => write!(f, " ({label})"),
             None => Ok(()),
         }

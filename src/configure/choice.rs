@@ -199,10 +199,8 @@ pub(super) fn choose(
         kept: &fixed_offers,
         left: &remaining,
     };
-    let withdrawn = whole.withdrawn();
-    let choices = (0..needing.len())
-        .map(|at| Choice { withdrawn: withdrawn.get(&at).cloned(), ..whole.choice(at) })
-        .collect();
+    let mut withdrawn = whole.withdrawn();
+    let choices = (0..needing.len()).map(|at| whole.choice(at, withdrawn.remove(&at))).collect();
     Ok(Configuration { choices, utility: chosen.utility, optimal: chosen.optimal })
 }
 
@@ -276,7 +274,7 @@ struct Whole<'a> {
 }
 
 impl Whole<'_> {
-    fn choice(&self, at: usize) -> Choice {
+    fn choice(&self, at: usize, withdrawn: Option<String>) -> Choice {
         let group = &self.needing[at];
         let considered = group.candidates.iter().enumerate().map(|(position, offer)| Considered {
             design: offer.design.clone(),
@@ -290,7 +288,7 @@ impl Whole<'_> {
             need: need(group),
             before: group.current().map(ToOwned::to_owned),
             design: self.designs[at].map(|position| group.candidates[position].design.clone()),
-            withdrawn: None,
+            withdrawn,
             considered: considered.collect(),
         }
     }

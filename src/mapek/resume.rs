@@ -82,7 +82,7 @@ pub(crate) fn resume<'p>(
         if remainder.has_started
             && let Some(facts) = reached_facts(schema, remainder.step, &problem)
         {
-            waive_start_conditions(&mut copy, remainder.step, &facts);
+            waive_start_conditions(&mut copy, |atom| facts.contains(&ground(atom, schema, remainder.step)));
         }
         let mut shortening = Shortening::new(remainder.progress, &gradual, &functions);
         shortening.compare_designs(schema, remainder);
@@ -287,9 +287,7 @@ fn changed_predicates(effect: &Effect) -> BTreeSet<Name> {
 }
 
 /// Removes the start conditions about facts that the action itself changes.
-fn waive_start_conditions(action: &mut Action, step: &PlannedStep, facts: &BTreeSet<GroundFact>) {
-    let schema = action.clone();
-    let is_changed = |atom: &Atom| facts.contains(&ground(atom, &schema, step));
+fn waive_start_conditions(action: &mut Action, is_changed: impl Fn(&Atom) -> bool) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => waive(precondition, &is_changed),
         ActionBody::Durative { conditions, .. } => {
@@ -365,14 +363,13 @@ impl<'a> Shortening<'a> {
                 }
             };
             let Some(present) = with_designs(open, &designs) else { continue };
-            let whole_change = ground_text(target, schema, step, &designs)
-                .filter(|_| is_only_target && !conditional.contains(&target.predicate.name));
-            let Some(text) = whole_change else {
+            let is_open = target.arguments.iter().any(|term| designs.contains_key(term.name()));
+            if is_open || !is_only_target || conditional.contains(&target.predicate.name) {
                 let difference = vec![signed(open, *is_increase), signed(&present, !*is_increase)];
                 let difference = Expression::Operation(Arithmetic::Add, difference, Span::default());
                 self.differences.push((target.clone(), difference));
                 continue;
-            };
+            }
             // One difference for all changes of this value. The progress may have been made with other designs than the
             // present ones, so the changes that it has made are constants.
             if self.differences.iter().any(|(other, _)| is_same(other, target)) {
@@ -380,7 +377,9 @@ impl<'a> Shortening<'a> {
             }
             let mut sum: Vec<Expression> =
                 of_function().map(|(_, is_increase, open)| signed(open, *is_increase)).collect();
-            let applied = remainder.applied.get(&text).cloned().unwrap_or_default();
+            let (function, arguments) = ground(target, schema, step);
+            let words: Vec<&str> = std::iter::once(&function).chain(&arguments).map(Name::as_str).collect();
+            let applied = remainder.applied.get(&words.join(" ")).cloned().unwrap_or_default();
             sum.push(Expression::Number(-applied / self.progress, Span::default()));
             let difference = Expression::Operation(Arithmetic::Add, sum, Span::default());
             self.differences.push((target.clone(), difference));
@@ -506,26 +505,6 @@ impl<'a> Shortening<'a> {
             *leaf = Expression::Operation(Arithmetic::Subtract, vec![leaf.clone(), so_far], Span::default());
         }
     }
-}
-
-/// Returns the function with the arguments of a step, without parentheses. `None` if an argument is an open design.
-fn ground_text(
-    target: &Atom,
-    schema: &Action,
-    step: &PlannedStep,
-    designs: &BTreeMap<&Name, &String>,
-) -> Option<String> {
-    let mut text = target.predicate.name.to_string();
-    for term in &target.arguments {
-        let name = term.name();
-        if designs.contains_key(name) {
-            return None;
-        }
-        let position = schema.parameters.iter().position(|parameter| parameter.identifier.name == *name);
-        text.push(' ');
-        text += &position.map_or_else(|| name.to_string(), |position| step.arguments[position].clone());
-    }
-    Some(text)
 }
 
 /// Replaces open designs by the present ones. Returns `None` if no design is open, or if the value depends on a chosen

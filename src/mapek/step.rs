@@ -81,8 +81,9 @@ impl PlannedStep {
 
     /// Returns `true` if the other step is the same action with the same arguments and designs.
     pub(crate) fn has_same_action(&self, other: &Self) -> bool {
-        let key = |step: &Self| (step.action.clone(), step.arguments.clone(), step.configuration.clone());
-        key(self) == key(other)
+        self.action == other.action
+            && self.arguments == other.arguments
+            && self.configuration == other.configuration
     }
 
     /// Returns the action with all arguments in PDDL syntax: `(move a b)`.

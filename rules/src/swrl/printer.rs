@@ -34,9 +34,8 @@ struct Printer<'a> {
 impl Printer<'_> {
     fn rule(&self, rule: &Rule) -> String {
         // `]` ends a label, and a label has no escapes.
-        let clean = |label: &str| label.replace(['\n', '\r'], " ").replace(']', ")");
-        let label =
-            rule.identity.label.as_ref().map(|label| format!("[{}] ", clean(label))).unwrap_or_default();
+        let label = rule.identity.label_line().map(|label| format!("[{}] ", label.replace(']', ")")));
+        let label = label.unwrap_or_default();
         let (body, head) = (self.atoms(rule, &rule.body), self.atoms(rule, &rule.head));
         let space = |text: &str| if text.is_empty() { "" } else { " " };
         format!("{label}{body}{}->{}{head} .", space(&body), space(&head))

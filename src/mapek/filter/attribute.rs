@@ -163,8 +163,7 @@ impl AttributeFilter {
     }
 
     fn judge(&self, state: &mut AttributeState, now: Micros, value: &BigRational) -> Verdict {
-        let below = self.minimum.as_ref().is_some_and(|minimum| compare(value, minimum).is_lt());
-        if below || self.maximum.as_ref().is_some_and(|maximum| compare(value, maximum).is_gt()) {
+        if !self.is_plausible(value) {
             return Verdict::Held(Hold::Range);
         }
         if self.is_jump(state, value) {
@@ -210,6 +209,11 @@ impl AttributeFilter {
             Some(target) => self.accept(state, target),
             None => Verdict::Held(Hold::Debounce),
         }
+    }
+
+    fn is_plausible(&self, value: &BigRational) -> bool {
+        self.minimum.as_ref().is_none_or(|minimum| compare(value, minimum).is_ge())
+            && self.maximum.as_ref().is_none_or(|maximum| compare(value, maximum).is_le())
     }
 
     fn is_jump(&self, state: &AttributeState, value: &BigRational) -> bool {
@@ -373,11 +377,7 @@ impl AttributeFilter {
         if self.maximum.as_ref().is_none_or(|maximum| maximum > last) {
             candidates.push(last + &unit);
         }
-        let is_plausible = |value: &&BigRational| {
-            self.minimum.as_ref().is_none_or(|minimum| *value >= minimum)
-                && self.maximum.as_ref().is_none_or(|maximum| *value <= maximum)
-        };
-        candidates.extend(values.iter().copied().filter(is_plausible).cloned());
+        candidates.extend(values.iter().copied().filter(|value| self.is_plausible(value)).cloned());
         candidates.sort();
         let kept_bounds = |value: &BigRational| self.bounds.iter().filter(|bound| bound.keeps(value)).count();
         candidates.into_iter().min_by_key(kept_bounds)
