@@ -1,5 +1,5 @@
 //! Cartesian abstraction refinement \[1\]: abstractions whose states are products of value sets, refined until
-//! the abstract plan is a plan, or a limit is reached.
+//! no split removes a flaw of the abstract plan, or a limit is reached.
 //!
 //! The abstraction starts with a single state. In each round, a cheapest abstract plan is executed in the task.
 //! The first flaw is a violated precondition, a state outside the abstract state of the plan, or a missed goal.
@@ -10,9 +10,9 @@
 //! determine whether a conditional effect occurs, both outcomes are transitions. The abstraction therefore
 //! admits every plan of the task.
 //!
-//! Each subtask has an abstraction of its own: a goal fact, or a fact landmark, i.e. a fact without which the goal
-//! is unreachable in the delete relaxation. A landmark is required only while it was not yet achieved. Therefore,
-//! the facts that are unreachable without the landmark count as goals of its subtask.
+//! Each goal fact and each fact landmark is a subtask with an abstraction of its own. A fact landmark is a fact
+//! without which the goal is unreachable in the delete relaxation. A landmark is required only while it was not
+//! yet achieved. Therefore, the facts that are unreachable without the landmark count as goals of its subtask.
 //!
 //! \[1\] J. Seipp, M. Helmert: Counterexample-guided Cartesian abstraction refinement for classical planning,
 //! JAIR 62, 2018.
@@ -27,16 +27,16 @@ use task::task::{Fact, Literal, Operator, Task, VariableId};
 
 use crate::bounds::abstraction::{Abstraction, Split, SplitNode, SplitTree, StateMap, UNREACHABLE};
 
-/// Work units for each visited transition, operator or variable.
+/// Work units for each visited transition or operator.
 const WORK_PER_VISIT: u64 = 8;
 /// Upper limit on the memory for the value sets of the abstract states of one abstraction, in bytes.
 const MAX_SET_BYTES: usize = 1 << 26;
 
-/// Part of a task: the goal facts of an abstraction.
+/// Part of a task for one abstraction, defined by its goal states.
 pub(super) struct Subtask {
     /// All these facts must hold in a goal state.
     pub(super) goals: Vec<Fact>,
-    /// Alternatively, one of these facts holds in a goal state.
+    /// A state in which one of these facts holds is a goal state, too.
     pub(super) unreachable: Vec<Fact>,
 }
 
@@ -64,7 +64,6 @@ struct Edge {
     operator: u32,
 }
 
-/// Truth value of a condition in an abstract state.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Truth {
     True,
@@ -72,8 +71,7 @@ enum Truth {
     Unknown,
 }
 
-/// Division of an abstract state by the values of a variable: into states with one of the values, and other
-/// states.
+/// A split of an abstract state: the states in which `variable` has one of `values`, and all other states.
 struct Flaw {
     state: u32,
     variable: usize,
@@ -95,7 +93,6 @@ struct Refinement<'a> {
     tree: Vec<SplitNode>,
     /// For each abstract state: its leaf in the tree.
     leaves: Vec<u32>,
-    /// Abstract state of the initial state.
     initial: u32,
     /// Lower bounds on the goal distances of abstract states.
     to_go: Vec<u32>,
@@ -242,8 +239,8 @@ impl<'a> Refinement<'a> {
         Ok(())
     }
 
-    /// Returns a cheapest abstract plan as operators with the abstract states they lead to; `None` if there is
-    /// none. A\* raises the lower bounds on goal distances that it uses as heuristic.
+    /// Returns a cheapest abstract plan: operators with the abstract states they lead to. Returns `None` if no
+    /// abstract goal state is reachable. Also raises `to_go`, the heuristic of this A\* search.
     fn abstract_plan(&mut self, pulse: &mut LimitPoll<'_>) -> Result<Option<Vec<Edge>>, Interrupted> {
         let mut costs = vec![UNREACHABLE; self.leaves.len()];
         let mut parents: Vec<Option<Edge>> = vec![None; self.leaves.len()];
@@ -340,8 +337,8 @@ impl<'a> Refinement<'a> {
             .collect()
     }
 
-    /// Adds the splits of the source state after which the operator does not lead from the part with `values`
-    /// to a value of `variable` outside the target state.
+    /// Adds splits of the source state by which the part with `values` may lose the transition to the target state,
+    /// because the operator leads to a value of `variable` outside the target state.
     fn explain_deviation(
         &self,
         operator: &Operator,
@@ -551,7 +548,7 @@ impl ValueSetField {
 }
 
 /// Assigns value sets of basic variables to words. A set of at most 64 values does not cross the end of a word.
-/// Returns the number of words, too.
+/// Also returns the number of words.
 #[expect(clippy::arithmetic_side_effects, reason = "bits of a word, and words in memory")]
 fn fields(task: &Task) -> (Vec<ValueSetField>, usize) {
     let mut fields = Vec::with_capacity(task.basic);

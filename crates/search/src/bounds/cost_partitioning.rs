@@ -63,8 +63,8 @@ impl CostPartitioning {
 }
 
 /// Returns at most `MAX_PARTITIONINGS` saturated cost partitionings, sorted by decreasing heuristic
-/// value of the initial state. The list is empty if the projections have too many transitions, or
-/// if no cost partitioning is better for the initial state than the best single projection.
+/// value of the initial state. The list is empty if fewer than two projections are useful, if they have too
+/// many transitions, or if no cost partitioning is better for the initial state than the best projection.
 pub(super) fn saturated_cost_partitionings(
     context: Context<'_>,
     projections: &[Projection],

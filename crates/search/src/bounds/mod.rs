@@ -61,9 +61,8 @@ pub struct ReachableWindow {
     /// Upper bound on the number of steps of plans within the cost limit. `None` if there is no cost limit,
     /// or no projection proves a bound below `STEP_LIMIT`.
     pub steps: Option<usize>,
-    /// For each step and each operator: `false` if it is proved that the operator cannot occur at
-    /// the step. The number of steps is the lesser of `steps` and the horizon given to
-    /// [`Bounds::window`]; 0 if there is neither.
+    /// For each step and each operator: `false` if it is proved that the operator cannot occur at the step. The
+    /// length of the list is the lesser of `steps` and the horizon given to [`Bounds::window`], or 0 without both.
     pub allowed: Vec<Vec<bool>>,
 }
 

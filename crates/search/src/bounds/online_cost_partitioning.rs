@@ -1,10 +1,10 @@
 //! Online saturated cost partitioning \[1\] over projections and Cartesian abstractions, for A\*.
 //!
-//! The abstractions are computed once, after a search has worked for some time. During the search, an order of
-//! the abstractions is computed now and then for the state that is being evaluated, whose estimate is low,
-//! because A\* expands states by increasing estimates of the plan cost. The cost partitioning of the order is kept
-//! if it raises the estimate of this state. The heuristic value is the maximum over all kept cost
-//! partitionings. The effort for new orders is limited to a part of the effort for evaluations.
+//! The abstractions are computed once, after a search has worked for some time. Then, from time to time, an order
+//! of the abstractions is computed for the state that is being evaluated. A\* expands states by increasing
+//! estimates of the plan cost, so this estimate is low. The cost partitioning of the order is kept if it raises
+//! the estimate of this state. The heuristic value is the maximum over all kept cost partitionings. The effort
+//! for new orders is limited to a part of the effort for evaluations.
 //!
 //! Each order is used twice \[2\]: first for the distances up to the distance of the state, so that abstractions
 //! do not use costs for states that are farther from the goal, and then for the remaining costs.
@@ -32,13 +32,13 @@ const MAX_PROJECTION_SIZE: usize = 100_000;
 const MIN_STRIDE: usize = 8;
 /// Upper limit on the number of kept cost partitionings.
 const MAX_PARTITIONINGS: usize = 128;
-/// The goal distances of all cost partitionings may take this part of the memory limit of a search, as a divisor.
+/// Divisor: the tables of goal distances may take at most 1/8 of the memory limit.
 const TABLE_SHARE: usize = 8;
 /// Work units to visit a transition or an abstract state in the computation of goal distances.
 const WORK_PER_VISIT: u64 = 10;
 /// Work units of an evaluation, for each abstraction.
 const WORK_PER_ABSTRACTION: u64 = 20;
-/// An order may cost this part of the work for evaluations and expansions since the last order, as a divisor.
+/// Divisor: computing an order may take at most 1/4 of the work for evaluations and expansions since the last order.
 const ORDER_SHARE: u64 = 4;
 /// Work units of A\* for each evaluated state, approximately.
 const WORK_PER_EVALUATION: u64 = 5_000;
@@ -58,10 +58,10 @@ pub struct OnlineCostPartitioning {
     transitions: usize,
     stride: usize,
     partitionings: usize,
-    /// For each abstraction: whether it detects dead ends, or has a share of a kept cost partitioning. Others are
-    /// evaluated only for new orders.
+    /// For each abstraction: `true` if it detects dead ends, or has a share of a kept cost partitioning. The other
+    /// abstractions are evaluated only for new orders.
     is_active: Vec<bool>,
-    /// For each abstraction: the costs that it needs and that other abstractions need, too.
+    /// For each abstraction: the operator costs that it takes from other abstractions, see [`stolen_costs`].
     stolen: Vec<u64>,
     limits: Limits,
     scratch: Scratch,
@@ -71,7 +71,7 @@ pub struct OnlineCostPartitioning {
     order_work: u64,
     evaluations: u64,
     next_order: u64,
-    /// Number of orders since the last one that was kept.
+    /// Number of orders since the last one that was kept, at most 10.
     failures: u32,
 }
 
@@ -194,13 +194,12 @@ impl OnlineCostPartitioning {
         self.work
     }
 
-    /// Returns the memory of the goal distances and abstractions, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.rows * self.stride * size_of::<u32>() + self.transitions * size_of::<(u32, u32)>()
     }
 
     /// Computes the cost partitioning of an order for a state from which no abstraction proves the goal
-    /// unreachable, and keeps it if it raises the estimate. Returns its estimate.
+    /// unreachable, and keeps it if it raises the estimate. Returns its estimate, or 0 if a limit is reached.
     fn try_order(&mut self, values: &[u32], estimate: u32) -> u32 {
         let is_full = self.partitionings + 1 >= self.stride
             && self.rows.saturating_mul((self.stride * 2).max(MIN_STRIDE)).saturating_mul(size_of::<u32>())

@@ -25,9 +25,9 @@ pub struct Projection {
     goals: Vec<u32>,
     /// Result of [`operator_costs`].
     costs: Arc<[Int]>,
-    /// Operators with transitions, ascending, each with the end of its transitions in `transitions`.
-    /// There are no transitions if the operator neither requires a fact of the pattern nor changes the
-    /// pattern. This holds for nearly all operators of a large task, so they take no memory.
+    /// Operators with transitions, ascending, each with the end of its transitions in `transitions`. An
+    /// operator has none if it neither requires a fact of the pattern nor may change the pattern. In a large
+    /// task, this holds for nearly all operators, which thus take no memory.
     operators: Vec<(usize, usize)>,
     transitions: Vec<Transition>,
     /// Minimum cost of the operators without transitions, if there are any.
@@ -108,7 +108,6 @@ impl Projection {
         ranges.map(move |((operator, end), start)| (*operator, &self.transitions[start..*end]))
     }
 
-    /// Returns all stored transitions, each with its operator.
     pub(super) fn all_transitions(&self) -> impl Iterator<Item = (usize, Transition)> {
         self.by_operator().flat_map(|(operator, transitions)| transitions.iter().map(move |t| (operator, *t)))
     }
@@ -118,7 +117,6 @@ impl Projection {
         self.pattern.iter().zip(&self.sizes).map(|(variable, size)| (variable.0, dense(*size)))
     }
 
-    /// Returns the abstract goal states.
     pub(super) fn goals(&self) -> &[u32] {
         &self.goals
     }
@@ -350,8 +348,8 @@ impl Projection {
         &self.transitions[start..self.operators[place].1]
     }
 
-    /// Returns the minimum cost of each abstract state after one more step; `None` if it is
-    /// unreachable.
+    /// Returns the minimum path cost to each abstract state after one more step than for `costs`; `None` if the
+    /// state cannot be reached in that number of steps.
     fn advance(&self, costs: &[Option<Int>]) -> Vec<Option<Int>> {
         let improve =
             |slot: &mut Option<Int>, cost: Int| *slot = Some(slot.map_or(cost, |least| least.min(cost)));

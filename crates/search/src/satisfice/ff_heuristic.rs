@@ -26,7 +26,6 @@ struct Supporter {
     times: u32,
 }
 
-/// Progress of a node of the delete relaxation during an evaluation.
 #[derive(Debug, Clone, Copy)]
 struct NodeProgress {
     /// Number of unreached conditions.

@@ -292,9 +292,9 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         Ok(())
     }
 
-    /// Returns propositions that are true when a landmark is achieved or directly before: the
-    /// landmark, the common effects of all its achievers, and its single facts of greedy-necessary
-    /// orders. Empty for a disjunctive landmark.
+    /// Returns propositions that are true when a landmark is achieved or directly before: the landmark, the
+    /// common effects of all its achievers, and the facts that it requires by greedy-necessary orders
+    /// (except disjunctions). Empty for a disjunctive landmark.
     fn side(&self, landmark: u32) -> Vec<Proposition> {
         let [proposition] = self.all[landmark as usize].any_of[..] else { return Vec::new() };
         let mut achievers = self.adders[proposition as usize].iter();

@@ -54,7 +54,8 @@ pub enum StepResult<N> {
     Plan(GroundPlan<N>),
     /// The task has no plan.
     Unsolvable,
-    /// The work budget is used up, or the next search begins. The search can be resumed.
+    /// The work budget is used up, or the current search has ended without a plan below the limit. `run` can be
+    /// called again.
     Paused,
     /// All searches of the sequence have ended.
     Ended,

@@ -2,8 +2,8 @@
 //!
 //! A state is novel if it has a fact that no earlier state of its partition has. States with the same values
 //! of both heuristics form a partition. Novel states are expanded first, so the search leaves plateaus in
-//! directions that it has not explored. Numbers are ignored. Only novelty 1 is distinguished, because the
-//! novelty 2 of a state needs the square of its number of facts.
+//! directions that it has not explored. Numbers are ignored. Only novelty 1 is distinguished, because novelty 2
+//! would require tables of pairs of facts.
 //!
 //! - \[1\] N. Lipovetzky, H. Geffner: Best-first width search: exploration and exploitation in classical
 //!   planning, AAAI 2017.

@@ -30,7 +30,7 @@ use crate::satisfice::step_order::StepOrder;
 use crate::search::SearchStatistics;
 
 const MIN_STEPS: usize = 4;
-/// Number of states that the search of a segment may evaluate, before the limit is first doubled.
+/// Initial limit on the number of states that the search of a segment evaluates.
 const MIN_EVALUATIONS: u64 = 100;
 const MAX_DOUBLINGS: u32 = 8;
 /// Weight of the heuristic in every second pass. In the other passes it is 1.
@@ -159,7 +159,7 @@ impl<N: TaskNumber> PlanImprovement<N> {
     /// with at least the current limit. Ends the pass after the last segment.
     fn begin_segment(&mut self, context: &mut SearchContext<'_, N>) {
         let count = self.plan.steps.len();
-        // The segment before has already reached the end of the plan.
+        // The previous segment has already reached the end of the plan.
         let is_last = self.next > 0 && self.next.saturating_add(self.segment / 2) >= count;
         if is_last || self.next >= count {
             self.end_pass(context);

@@ -40,7 +40,7 @@ pub(super) enum HeuristicWeight {
 }
 
 pub(super) enum SearchGoal<N> {
-    /// Guided also by landmarks.
+    /// The goal of the task. The search also uses landmarks.
     Task,
     /// Goal of a segment (consecutive steps of a plan), for a search from a state of the plan.
     Segment(State<N>, SegmentGoal),
@@ -89,7 +89,7 @@ pub(super) struct Search<N> {
     mean: u32,
     store: Store<N>,
     nodes: Vec<Node<N>>,
-    /// Bitset of `stride` words for each state.
+    /// For each state: the reached landmarks, as a bitset of `stride` words.
     reached: Vec<u64>,
     /// 0 if the search uses no landmarks.
     stride: usize,

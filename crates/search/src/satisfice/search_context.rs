@@ -17,7 +17,7 @@ use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::{MutexPairs, SearchStatistics, is_monotone};
 
 /// A search ends if `Search::size` exceeds the memory limit in bytes divided by this number. `Search::size` counts
-/// words of 8 bytes. So a search may use at most half of the memory limit.
+/// words of 8 bytes, and a search may use at most half of the memory limit.
 pub(super) const MEMORY_SHARE: usize = 16;
 /// Work units charged for generating a successor and looking it up in the store.
 pub(super) const GENERATION_COST: u64 = 200;

@@ -38,9 +38,9 @@ use crate::search::symmetry::Orbits;
 const EXPANSION_COST: u64 = 2_000;
 /// Work units charged for generating a successor: applying the operator and looking the state up.
 const GENERATION_COST: u64 = 600;
-/// Number of evaluations of an improving heuristic after which it is no longer used if it raised too few f values.
+/// Length of a trial in evaluations. After each trial, the improving heuristic is dropped if it raised too few f values.
 const IMPROVING_TRIAL: u64 = 5_000;
-/// An improving heuristic must raise this part of the evaluated f values, as a divisor.
+/// Divisor: the improving heuristic must raise at least 1/25 of the f values that it evaluates in a trial.
 const IMPROVING_SHARE: u64 = 25;
 /// Work units charged for each operator that the stubborn-set computation visits.
 const STUBBORN_SET_COST: u64 = 10;
@@ -93,9 +93,8 @@ pub(super) enum OutOfMemoryPolicy {
     Needed,
 }
 
-/// Sort key of an open node: f value (heuristic value in greedy search), lower bound on steps (of
-/// the plan or to the goal, see `OpenListOrder`; 0 in greedy search), and a tie-breaker for deep
-/// nodes.
+/// Sort key of an open node: f value (heuristic value in greedy search), lower bound on steps (of the plan or
+/// to the goal, see `OpenListOrder`; 0 in greedy search), and a tie-breaker that prefers deep nodes.
 type NodeKey<N> = (N, u32, u32);
 
 fn later(steps: u32) -> u32 {
@@ -204,8 +203,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         search
     }
 
-    /// Searches until the search has finished. Returns `None` if before that more than `max_states`
-    /// states are stored or the memory limit is reached.
+    /// Runs the search to its end. Returns `None` if the search first stores more than `max_states` states or
+    /// reaches the memory limit.
     pub(super) fn run_until_states(
         &mut self,
         max_states: usize,
@@ -214,8 +213,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.resume(max_states, u64::MAX, hear)
     }
 
-    /// Searches until the total work exceeds `work` units. Returns `None` if the search can be
-    /// resumed. If the memory limit is reached, the outcome is `Unknown` with the best plan.
+    /// Searches until the total work exceeds `work` units. Returns `None` if the search can be resumed. If the
+    /// memory limit is reached, the outcome is `Unknown` with the best plan.
     pub(super) fn run_for_work(
         &mut self,
         work: u64,
@@ -273,7 +272,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             }
             self.store.unpack(id, &mut self.state);
             let Some((total, ..)) = self.reevaluate(id, key) else {
-                // Many nodes may be raised in a row, without an expansion that looks at the limits.
+                // Many nodes may be raised in a row, without an expansion that polls the limits.
                 if pulse.beat().is_err() {
                     self.is_interrupted = true;
                     return Some(SearchOutcome::Unknown(self.best_plan()));
@@ -327,8 +326,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         }
     }
 
-    /// Returns `true` if a heuristic value raises the f value of a node. Then the node is inserted again with a
-    /// higher key, unless it cannot improve the incumbent.
+    /// Returns `true` if a heuristic value raises the f value of a node, or the f value overflows. A raised node is
+    /// inserted again with a higher key, unless it cannot improve the incumbent.
     fn is_raised(&mut self, id: u32, key: &NodeKey<N>, estimate: &N) -> bool {
         let Some(total) = self.store.cost(id).plus(estimate) else {
             self.states_dropped = true;
@@ -366,8 +365,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.limit.as_ref()
     }
 
-    /// Lowers the upper bound on the plan cost to `cost`, unless it is already lower. The search still looks
-    /// for plans with exactly this cost.
+    /// Lowers the upper bound on the plan cost to `cost`, unless it is already lower. Plans with exactly this
+    /// cost are not pruned.
     pub(super) fn set_upper_bound_inclusive(&mut self, cost: &N) {
         if self.limit.as_ref().is_none_or(|limit| cost < limit) {
             self.limit = Some(cost.clone());
@@ -508,9 +507,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         Ok(())
     }
 
-    /// Stores the successor in `self.next`, unless it is dominated, too expensive or a dead end, or its f
-    /// value overflows. A goal state becomes the incumbent. The derived variables of the successor are not
-    /// evaluated yet. `through` is the f value of the parent.
+    /// Stores the successor in `self.next`, unless it is dominated, a dead end, or cannot improve the incumbent,
+    /// or its f value overflows. A stored goal state becomes the incumbent. The derived variables of the
+    /// successor need not be evaluated. `through` is the f value of the parent.
     fn push(&mut self, cost: N, through: &N, origin: ParentLink) {
         self.statistics.generated = self.statistics.generated.saturating_add(1);
         if self.exceeds_upper_bound(&cost) {
@@ -556,7 +555,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         (limit, fewest) <= (cost, steps)
     }
 
-    /// Evaluates the derived variables of `self.next` if necessary.
+    /// Returns `true` if `self.next` is a goal state. Evaluates its derived variables if necessary.
     fn is_goal(&mut self) -> bool {
         let values = &self.next.values[..self.task.basic];
         let is_basic = |fact: &&Fact| fact.variable.index() < values.len();

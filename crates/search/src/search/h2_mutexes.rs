@@ -14,7 +14,7 @@ use task::number::dense;
 use task::task::number::TaskNumber;
 use task::task::{Fact, Operator, OperatorId, Task, VariableId};
 
-/// Upper limit on the number of facts; the pair table then takes 8 MB.
+/// Upper limit on the number of facts; a pair table then takes 8 MB.
 const MAX_FACTS: usize = 8_000;
 /// Limit on the work of the fixpoint computation, as the number of visited bitset words (about 0.5 s).
 const MAX_WORK: usize = 400_000_000;
@@ -25,7 +25,7 @@ type Words = Vec<u64>;
 
 struct Rule {
     before: Vec<u32>,
-    /// Facts that are known to hold after the operator.
+    /// Facts that certainly hold after the operator.
     after: Vec<u32>,
     adds: Vec<u32>,
     /// All facts of the variables that the operator certainly sets.
@@ -58,7 +58,7 @@ impl Table {
         has(self.row(one), other)
     }
 
-    /// Returns `true` if the two facts were not marked as compatible before.
+    /// Marks two facts as compatible. Returns `true` if they were not marked before.
     fn insert(&mut self, one: u32, other: u32) -> bool {
         let is_new = !self.has(one, other);
         for (row, fact) in [(one, other), (other, one)] {

@@ -10,8 +10,8 @@
 
 use task::number::dense;
 
-/// Comparison of labels (search nodes) by several criteria. A label has one number for each
-/// criterion. Both are given by their indices.
+/// Comparison of labels (search nodes) by several criteria. A label has one number for each criterion. Labels
+/// and numbers are given by their indices.
 pub(super) trait Criteria {
     /// Returns `true` if number `one` is at least as good as number `other` by the criterion.
     fn is_as_good(&self, criterion: usize, one: u32, other: u32) -> bool;

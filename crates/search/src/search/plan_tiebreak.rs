@@ -111,11 +111,11 @@ struct Choice {
     /// Functions used by the operator (as positions in `TieBreakContext::functions`), with their
     /// designs.
     configuration: Vec<(usize, ObjectId)>,
-    /// Whether the step is kept from the reference plan; also `true` if there is no reference plan.
+    /// `true` if the step is in the reference plan, or there is no reference plan.
     is_kept: bool,
 }
 
-/// In ascending order; `None` if there are too many combinations.
+/// Combinations of designs of an operator, in ascending order; `None` if there are too many.
 type Choices = Option<Vec<Choice>>;
 
 #[derive(Default)]
@@ -130,8 +130,8 @@ pub struct PlanPrefix<'a> {
     pub state: &'a State,
     /// Last design of each function before the plan, as pairs (function, design).
     pub designs: &'a [(ObjectId, ObjectId)],
-    /// Steps of a reference plan; empty without a reference plan. Among equally good plans, a plan with more
-    /// of these steps is selected.
+    /// Steps of a reference plan; empty without a reference plan. The number of steps outside this set is
+    /// minimised first.
     pub close_to: &'a FxHashSet<GroundStep>,
 }
 
@@ -173,7 +173,7 @@ impl TieBreakContext {
         })
     }
 
-    /// Returns the Pareto-optimal combinations of designs, and those of the reference plan, in
+    /// Returns the Pareto-optimal combinations of designs of an operator, and those of the reference plan, in
     /// ascending order. Returns `None` if there are too many combinations.
     fn choices_of(
         &self,
@@ -317,8 +317,8 @@ impl Ties<'_> {
     /// designs. Returns `None` if the goal is unreachable within the number of steps of the known
     /// plan.
     ///
-    /// The finite-domain variables of all these states are equal unless the operator has conditional effects,
-    /// in which case the bound is 0.
+    /// The designs of the operator do not affect the basic finite-domain variables. The bound is 0 if the
+    /// operator has conditional effects, because they are not applied here.
     fn cost_to_go_after(&self, label: &Label, operator: OperatorId) -> Option<Int> {
         let operator = &self.task.operators[operator.index()];
         let remaining_steps = self.steps.checked_sub(label.steps)?.checked_sub(1)?;
@@ -411,13 +411,13 @@ impl Ties<'_> {
     }
 
     /// Returns the first plan in model order with at most `changes`, which must be the minimum.
-    /// Uses depth-first search. Returns `None` if a limit is reached.
+    /// Uses depth-first search. Returns `None` if a limit is reached or no plan is found.
     ///
-    /// A label is pruned if a visited label is at least as good. If the visited label has led to no
-    /// plan, the new label leads to none either. If the visited label is an ancestor of the new
-    /// label, a plan from the new label would imply a shorter plan from the ancestor, which cannot
-    /// exist. A label is also pruned if a label in `first_labels` is strictly better in cost, steps
-    /// or changes, because the minimum values of all three are known.
+    /// A label is pruned if a visited label is at least as good. If the visited label has led to no plan, the
+    /// new label leads to none either. If the visited label is an ancestor of the new label, a plan from the new
+    /// label would imply a shorter plan from the ancestor. A label is also pruned if a label in `first_labels` is
+    /// at least as good, and better in cost, steps or changes. The pruning is exact if the known plan is a
+    /// shortest one among the cheapest plans.
     fn first_in_order(
         &self,
         start: Label,

@@ -4,12 +4,12 @@
 //! search finds no plan soon and has no cost limit, a greedy search provides an upper bound.
 //!
 //! In `search`, A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search
-//! looks for some plan. Then two A\* searches alternate: one uses only pattern databases, the other also
-//! LM-cut. After some work, both also use online cost partitioning, which they share, because the computation of
-//! its abstractions would take longer than most proofs. The LM-cut search first gets a quarter of the other's work, and later the same work. A search then
-//! gets only half of its work if its lower bound lags behind that of the other, or if its memory may not
-//! suffice. The result of the search that finishes first is returned. Work is counted in units instead of
-//! time, so the result without a time limit is deterministic.
+//! provides an upper bound. Then two A\* searches alternate: both use pattern databases, the second also LM-cut.
+//! After some work, they share online cost partitioning; computing its abstractions earlier would take longer
+//! than most proofs. The LM-cut search first gets a quarter of the other's work, and later the same work. A
+//! search whose lower bound lags behind that of the other gets half of its work. The result of the search that
+//! finishes first is returned. Work is counted in units instead of time, so the result without a time limit is
+//! deterministic.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -149,8 +149,9 @@ fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
     greedy.best_plan()
 }
 
-/// Two A\* searches of a task that alternate. The first uses pattern databases only. The second also
-/// evaluates LM-cut lazily; it is added if the first call of `run` does not finish and LM-cut is available.
+/// Two A\* searches of a task that alternate. Both use pattern databases, and later a shared heuristic that
+/// improves. The second search also evaluates LM-cut lazily; it is added if the first call of `run` does not
+/// finish and LM-cut is available.
 pub struct InterleavedSearch<'a, N, E> {
     space: SearchProblem<'a, N, E>,
     initial: State<N>,
@@ -206,8 +207,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         self.searches.iter().fold(self.figures, |sum, search| sum.plus(search.statistics))
     }
 
-    /// Returns the best plan of all searches, including abandoned searches. Returns `None` if no plan was
-    /// found, or only plans that cost more than a plan set from outside.
+    /// Returns the best plan of all searches, including abandoned searches. A running search discards its plan
+    /// when an upper bound below its cost is set.
     pub fn best_plan(&self) -> Option<GroundPlan<N>> {
         let plans = self.searches.iter().filter_map(AStar::best_plan);
         plans.fold(self.best.clone(), |best, plan| cheaper(best, Some(plan)))
@@ -218,8 +219,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
     /// `STATE_LIMIT`, the LM-cut search gets a quarter of the work. In all other cases, a search
     /// gets half if it lags behind or is forecast to run out of memory.
     ///
-    /// Returns `None` if the searches are not finished. `SearchOutcome::Unknown(None)` alone proves nothing. It
-    /// is also returned if a search reaches the cost set by `set_upper_bound`; the proof is then the lower
+    /// Returns `None` if the searches are not finished. `SearchOutcome::Unknown(None)` alone proves nothing. This
+    /// outcome is also returned if a search reaches the cost set by `set_upper_bound`; the proof is then the lower
     /// bound that `hear` has received.
     pub fn run(&mut self, max_states: usize, hear: ProgressCallback<'_, N>) -> Option<SearchOutcome<N>> {
         if !self.has_begun {
@@ -287,8 +288,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         self.searches.is_empty().then(|| SearchOutcome::Unknown(self.best.clone()))
     }
 
-    /// Adds the heuristic that improves during the search to all searches. `work` is the budget of this round; its
-    /// computation may cost half of it.
+    /// Adds the heuristic that improves during the search to all searches. Its precomputation may cost at most
+    /// half of `work`, the budget of this round.
     fn add_improving_heuristic(&mut self, work: u64) {
         self.has_improving = true;
         let SearchProblem { context, bounds, .. } = self.space;
@@ -361,11 +362,11 @@ pub enum NoLabels {
 }
 
 /// Runs an A\* search and returns the closed states whose f value (path cost plus heuristic value) is below
-/// `cost`, which must not exceed the cost of an optimal plan. If `cost` is `None`, no plan must exist, and
+/// `cost`, which must not exceed the cost of an optimal plan. If `cost` is `None`, there must be no plan, and
 /// all closed states are returned.
 ///
 /// # Errors
-/// These conditions do not hold, or the search has no proof after `STATE_LIMIT` states.
+/// Fails if a condition on `cost` does not hold, or if the search ends without a proof, see [`NoLabels`].
 pub fn closed_labels<N: TaskNumber>(
     context: Context<'_, N>,
     bounds: &impl Heuristic<N>,

@@ -58,8 +58,8 @@ impl<N: TaskNumber> SearchTask<N> {
         GroundStep { operator: OperatorId(dense(operator)), choice }
     }
 
-    /// Returns a lower bound on the number of steps that cost at least `cost`; 0 if no operator has a
-    /// positive cost.
+    /// Lower bound on the number of steps whose costs add up to at least `cost`; 0 if no operator has a positive
+    /// cost.
     pub(super) fn steps_at_least(&self, cost: &N) -> u32 {
         if self.dearest > N::zero() { cost.times_at_least(&self.dearest) } else { 0 }
     }

@@ -40,7 +40,7 @@ struct ComparedVariable {
 /// Bit that marks an entry of `fronts` as an index in `trees` instead of the index of a node.
 const TREE_FLAG: u32 = 1 << 31;
 
-/// Equal numbers have equal indices.
+/// Interned numbers: equal numbers have equal indices.
 struct Numbers<N> {
     all: Vec<N>,
     table: HashTable<u32>,
@@ -93,7 +93,7 @@ pub(super) struct StateRegistry<N> {
     key: Vec<u32>,
     /// Compared numbers of the state that is looked up.
     own: Vec<u32>,
-    /// Symmetric states count as equal. The keys are then canonical.
+    /// If set, symmetric states count as equal, and the keys are canonical.
     orbits: Option<Arc<Orbits>>,
     /// With symmetries: the packed original values of each node.
     plain: Vec<u32>,
@@ -217,6 +217,7 @@ impl<N: TaskNumber> StateRegistry<N> {
     pub(super) fn bytes(&self) -> usize {
         let words = [&self.keys, &self.fronts, &self.others, &self.plain]
             .map(|list| list.len().saturating_mul(size_of::<u32>()));
+        // An entry takes four bytes and a control byte, and at most seven of eight buckets are used.
         let tables = [&self.table, &self.numbers.table].map(|table| table.capacity().saturating_mul(6));
         let nodes = self.nodes.len().saturating_mul(size_of::<Node>());
         let numbers = self.numbers.all.len().saturating_mul(size_of::<N>());

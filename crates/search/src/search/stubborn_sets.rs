@@ -3,13 +3,13 @@
 //! Operators that do not interfere can be reordered, so only one of their orders must be searched. A set of
 //! operators is stubborn in a state \[1\] if it contains
 //!
-//! - every operator that makes a selected unsatisfied part of the goal true;
-//! - for each inapplicable operator in the set, every operator that makes a selected unsatisfied part of its
-//!   precondition true;
+//! - every operator that may make a selected unsatisfied part of the goal true;
+//! - for each inapplicable operator in the set, every operator that may make a selected unsatisfied part of
+//!   its precondition true;
 //! - for each applicable operator o in the set, every operator that o *disturbs*: an operator that requires
-//!   or sets another value of a variable that o sets, or has a conditional effect that depends on such a
-//!   variable. If o has conditional effects, the set also contains every operator that sets a variable in
-//!   their conditions.
+//!   or sets another value of a variable that o sets, or reads such a variable in a clause or in the
+//!   condition of a conditional effect. If o has conditional effects, the set also contains every operator
+//!   that sets a variable in their conditions.
 //!
 //! Proof sketch. Consider a plan from the state, and the first operator of the plan that is in the set. Such
 //! an operator exists by the first condition. It is applicable, because otherwise, by the second condition,
@@ -203,7 +203,7 @@ impl StubbornSetPruning {
         }
     }
 
-    /// Ensures that the set contains all operators that achieve one unsatisfied part of a condition. Returns
+    /// Ensures that the set contains all operators that may achieve one unsatisfied part of a condition. Returns
     /// `false` if the condition holds.
     fn enable<N>(
         &mut self,

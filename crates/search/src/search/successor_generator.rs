@@ -106,7 +106,8 @@ impl SuccessorGenerator {
         index
     }
 
-    /// Returns the operators whose propositional conditions hold in a state, in ascending order.
+    /// Returns the operators whose propositional conditions hold in a state, in ascending order. Numeric
+    /// conditions are not tested.
     pub fn applicable<N>(&self, task: &Task<N>, state: &State<N>) -> Vec<OperatorId> {
         let mut operators = Vec::new();
         let mut stack = vec![0_u32];
