@@ -11,7 +11,6 @@ use testing::{depot, fleet, ground_text, optimum};
 
 /// Number of work units of a turn. A turn ends in the middle of a search.
 const TURN: u64 = 20_000;
-/// Maximum number of turns.
 const TURNS: usize = 2_000;
 
 #[derive(Default)]

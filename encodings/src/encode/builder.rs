@@ -21,7 +21,6 @@ pub(super) struct Builder<'a> {
     pub(super) limits: &'a Limits,
     pub(super) formula: Formula,
     pub(super) variables: Variables,
-    /// Maximum number of clauses of the formula.
     most: usize,
     groups: FxHashMap<(usize, Vec<OperatorId>), Lit>,
 }
@@ -46,8 +45,8 @@ impl<'a> Builder<'a> {
     }
 
     /// Returns a literal that is true if an operator in `members` is executed at the step. If the group is new, its
-    /// defining clauses are added to `family`. Members that are impossible at the step are ignored; if none, one or all
-    /// possible operators of the step remain, no new variable is needed.
+    /// defining clauses are added to `family`. Members that are impossible at the step are ignored. The remaining
+    /// members need a new variable only if there are at least two, but not all possible operators of the step.
     pub(super) fn group(&mut self, step: usize, members: &[OperatorId], family: Family) -> Lit {
         let present: Vec<_> = {
             let candidates = &self.variables.operators[step];

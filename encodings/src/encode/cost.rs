@@ -167,8 +167,8 @@ impl Sum<'_, '_> {
     }
 
     fn increments(&mut self, step: usize) -> Vec<Increments> {
-        // Each source contributes at most one amount. So operators that can be executed at the same
-        // step are separate sources.
+        // Each source contributes at most one amount. Operators that can be executed at the same step are therefore
+        // separate sources.
         let mut by_source: BTreeMap<(Option<usize>, Option<OperatorId>), Increments> = BTreeMap::new();
         for index in 0..self.builder.variables.operators[step].len() {
             let (id, literal) = self.builder.variables.operators[step][index];

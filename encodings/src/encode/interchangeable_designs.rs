@@ -1,9 +1,8 @@
 //! Detects interchangeable designs of a slot (a parameter for a function design) by hashing.
 //!
 //! Each design has a signature: a hash of its entries in the tables of effects, comparisons and costs, and in the
-//! forbidden combinations. Tables of durations and of further objectives are ignored.
-//! Only designs with equal signatures are compared. So not every pair of designs is compared, and the running
-//! time is about linear in the size of the tables.
+//! forbidden combinations. Tables of durations and of further objectives are ignored. Only designs with equal
+//! signatures are compared. The running time is therefore about linear in the size of the tables.
 
 use std::hash::{BuildHasher, Hash};
 

@@ -178,8 +178,7 @@ impl Interference {
             };
             let mut chain: Vec<_> = users.iter().filter_map(present).collect();
             ladder(&mut builder.formula, &chain);
-            // In ∀-step semantics every order must be executable, so the reverse order is excluded
-            // as well.
+            // In ∀-step semantics, every order must be executable. The conflicts therefore apply in the reverse order, too.
             if self.both_orders {
                 chain.reverse();
                 ladder(&mut builder.formula, &chain);

@@ -5,7 +5,7 @@
 //! The encoding has finite-domain variables and explanatory frame axioms \[1\], with one or several
 //! operators per step. Unused steps are idle and come at the end. The designs of an operator's
 //! slots (its parameters for function designs) have variables separate from the operator's
-//! variable. So the formula grows with the sum of the numbers of designs, not with their product.
+//! variable. The formula therefore grows with the sum of the numbers of designs, not with their product.
 //! Each family of clauses has a file.
 //!
 //! The heads of these files state the clauses symbolically. `o@t` means that operator o is executed at step

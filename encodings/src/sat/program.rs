@@ -4,8 +4,8 @@
 //! assignment in lines `v …`), and that of `MiniSat`'s result file (`SAT`, and the assignment on
 //! the next line). The process is killed when a limit is reached, but not other processes that it has
 //! started. Programs have no portable option for a conflict budget, so a time limit replaces the
-//! budget. Each call starts a new process that receives the assumptions as clauses. So learnt clauses
-//! are lost, and the core always contains all assumptions.
+//! budget. Each call starts a new process that receives the assumptions as clauses. Learnt clauses are
+//! therefore lost, and the core always contains all assumptions.
 //!
 //! \[1\] DIMACS challenge: Satisfiability, suggested format, 1993.
 

@@ -1,14 +1,14 @@
 //! Varisat \[1\] back end.
 //!
 //! Varisat has no function for interrupting it. But it streams its proof, and stops if writing the
-//! proof fails. So the proof goes to a sink that counts learnt clauses and fails at a limit. The
+//! proof fails. The proof therefore goes to a sink that counts learnt clauses and fails at a limit. The
 //! sink requests Varisat's own proof format, because DRAT supports neither assumptions nor clauses
 //! that are added later.
 //!
 //! Answers under assumptions are correct. But after the first call that is unsatisfiable because of its
-//! assumptions, stale marks inside the solver may put wrong assumptions into a core. So each later core is
-//! confirmed by one more call. If this call finds an assignment, a new solver with the same clauses computes
-//! the core.
+//! assumptions, stale marks inside the solver may put wrong assumptions into a core. Each later core is
+//! therefore confirmed by one more call. If this call finds an assignment, a new solver with the same clauses
+//! computes the core.
 //!
 //! \[1\] J. Harder: Varisat, <https://jix.github.io/varisat/>.
 

@@ -18,17 +18,16 @@ pub(super) const UNREACHABLE: u32 = u32::MAX;
 pub(super) const MAX_DISTANCE: u32 = 1 << 23;
 pub(super) const MAX_ABSTRACTIONS: usize = 256;
 
-/// Inner node of a [`SplitTree`]: states whose variable has one of some values belong to `children[1]`, and
-/// all other states to `children[0]`.
+/// Inner node of a [`SplitTree`]: states in which `variable` has one of `values` belong to `children[1]`, all
+/// other states to `children[0]`.
 #[derive(Clone)]
 pub(super) struct Split {
     pub(super) variable: u32,
-    /// Bits of the values.
+    /// Bitset of the values.
     pub(super) values: Box<[u64]>,
     pub(super) children: [u32; 2],
 }
 
-/// A node of a [`SplitTree`].
 #[derive(Clone)]
 pub(super) enum SplitNode {
     /// An abstract state.
@@ -64,7 +63,6 @@ pub(super) enum StateMap {
     Tree(SplitTree),
 }
 
-/// An abstraction: abstract states, their transitions to other abstract states, and the abstract goal states.
 pub(super) struct Abstraction {
     map: StateMap,
     goals: Vec<u32>,
@@ -74,12 +72,10 @@ pub(super) struct Abstraction {
     incoming: Vec<(u32, u32)>,
 }
 
-/// Buffers for computing goal distances and saturated costs.
 pub(super) struct Scratch {
     queue: BinaryHeap<Reverse<(u32, u32)>>,
     /// For each operator: its saturated cost. 0 between two computations.
     used: Vec<u32>,
-    /// Operators whose saturated cost is positive.
     touched: Vec<u32>,
 }
 
@@ -123,7 +119,6 @@ impl Abstraction {
         Self::new(map, projection.costs().len(), projection.goals().to_vec(), transitions)
     }
 
-    /// Number of abstract states.
     pub(super) fn len(&self) -> usize {
         self.ends.len()
     }

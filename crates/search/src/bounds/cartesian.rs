@@ -40,7 +40,6 @@ pub(super) struct Subtask {
     pub(super) unreachable: Vec<Fact>,
 }
 
-/// Limits of the refinement of one abstraction.
 #[derive(Clone, Copy)]
 pub(super) struct RefinementLimits {
     pub(super) transitions: usize,
@@ -91,7 +90,6 @@ struct Refinement<'a> {
     incoming: Vec<Vec<Edge>>,
     transitions: usize,
     tree: Vec<SplitNode>,
-    /// For each abstract state: its leaf in the tree.
     leaves: Vec<u32>,
     initial: u32,
     /// Lower bounds on the goal distances of abstract states.

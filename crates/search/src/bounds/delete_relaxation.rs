@@ -14,7 +14,6 @@ use task::task::{Condition, Fact, Literal, Task};
 
 /// Maximum operator cost, so that sums do not overflow.
 const COST_LIMIT: Int = 1 << 40;
-/// Artificial fact that is always true.
 pub(super) const ALWAYS: u32 = 0;
 pub(super) const GOAL: u32 = 1;
 

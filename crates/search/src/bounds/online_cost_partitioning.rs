@@ -28,9 +28,8 @@ use crate::bounds::pattern_database::Projection;
 const MAX_TRANSITIONS: usize = 1_000_000;
 /// Upper limit on the number of transitions of a projection. Greater projections are omitted.
 const MAX_PROJECTION_SIZE: usize = 100_000;
-/// Number of columns of the tables after they have grown for the first time.
+/// Number of columns of the tables after the first growth.
 const MIN_STRIDE: usize = 8;
-/// Upper limit on the number of kept cost partitionings.
 const MAX_PARTITIONINGS: usize = 128;
 /// Divisor: the tables of goal distances may take at most 1/8 of the memory limit.
 const TABLE_SHARE: usize = 8;
@@ -435,7 +434,6 @@ mod tests {
         [kept, positive]
     }
 
-    /// Checks random tasks of four kinds. Returns the sums of the results of [`check_online`] for each kind.
     fn check_online_all(seeds: std::ops::Range<u64>) -> [[usize; 2]; 4] {
         let mut sums = [[0; 2]; 4];
         for seed in seeds {

@@ -112,7 +112,6 @@ impl Projection {
         self.by_operator().flat_map(|(operator, transitions)| transitions.iter().map(move |t| (operator, *t)))
     }
 
-    /// Returns the variables of the pattern, each with the number of its values.
     pub(super) fn pattern_sizes(&self) -> impl Iterator<Item = (u32, u32)> {
         self.pattern.iter().zip(&self.sizes).map(|(variable, size)| (variable.0, dense(*size)))
     }
@@ -450,7 +449,6 @@ mod tests {
     use super::*;
     use crate::bounds::Bounds;
 
-    /// Checks which operators are stored against the facts that each operator mentions.
     #[test]
     fn only_operators_that_mention_the_pattern_take_memory() {
         let mut omitted = 0;

@@ -33,7 +33,6 @@ pub struct AlternatingOpenList<K> {
     lists: Vec<List<K>>,
     /// Steps of all entries. A step is the id of an operator with designs.
     steps: Vec<u32>,
-    /// Number of entries of all lists together.
     entries: usize,
 }
 

@@ -15,7 +15,6 @@ use rustc_hash::FxHashMap;
 
 use crate::satisfice::delete_relaxation::Proposition;
 
-/// For each partition of the states: the facts that at least one of its states has.
 pub(super) struct NoveltyTable {
     /// Number of words of the bitset of a partition.
     stride: usize,

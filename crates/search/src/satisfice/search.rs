@@ -57,7 +57,6 @@ struct Node<N> {
     is_pending: bool,
 }
 
-/// Sort keys of a state in the open lists of a search.
 struct Keys {
     ff_value: u64,
     /// `None` if the search uses no landmarks.

@@ -526,7 +526,6 @@ mod tests {
         cost: Int,
         steps: usize,
         prefix: Vec<GroundStep>,
-        /// The first plan with the fewest reconfigurations, and their number.
         best: Option<(usize, Vec<GroundStep>)>,
         visited: usize,
     }

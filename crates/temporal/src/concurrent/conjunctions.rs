@@ -40,8 +40,8 @@ struct Index {
     setting: Vec<Vec<u32>>,
 }
 
-/// Adds conjunctions to a relaxed task, rewrites rules and goal to require them, and returns them.
-/// A conjunction holds initially if both members hold.
+/// Adds conjunctions to a relaxed task, rewrites rules and goal to require them, and returns them. Callers must
+/// let a conjunction hold in the evaluated state if both members hold.
 #[expect(clippy::arithmetic_side_effects, reason = "propositions and rules are held in memory")]
 pub(super) fn add_conjunctions(scope: &mut Scope<'_>) -> Vec<Conjunction> {
     let index = Index::new(scope);

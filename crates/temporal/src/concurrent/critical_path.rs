@@ -40,7 +40,7 @@ pub(super) struct CriticalPath<'a, T: TimeNumber = Int> {
     end_rules: Vec<Vec<u32>>,
     // The remaining fields but the last one describe the evaluated state.
     times: Vec<Option<T>>,
-    /// Whether the state itself satisfies each proposition.
+    /// For each proposition: `true` if the evaluated state satisfies it.
     holds: Vec<bool>,
     is_settled: Vec<bool>,
     unmet: Vec<u32>,
@@ -180,7 +180,7 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
         for index in 0..self.relaxation.numeric.len() {
             let numeric = &self.relaxation.numeric[index];
             let proposition = numeric.proposition;
-            // A value that overflows is not known to be too small.
+            // A value that overflows may satisfy the condition.
             if numeric.linear.value(&state.numbers, &[], &[]).is_none_or(|value| value >= 0) {
                 self.hold(proposition);
             }

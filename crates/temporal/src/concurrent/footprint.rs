@@ -64,10 +64,9 @@ impl Footprint {
     }
 }
 
-/// Computes the write sets of happenings, and indexes the written atoms and numbers.
 pub(super) struct Footprints<'a> {
     world: World<'a>,
-    /// Whether some write set contains an effect that does not apply in every state.
+    /// `true` if some write set contains an effect that does not apply in every state.
     pub(super) supposes: bool,
 }
 

@@ -7,12 +7,12 @@
 //! processing time \[1\]. Local search then swaps and moves goals \[2\]; decoding a sequence of
 //! intermediate goals by a simple planner is the scheme of \[3\].
 //!
-//! The greedy search (`greedy`) usually expands each state only once, regardless of its times. So it
-//! rarely changes how actions are distributed among interchangeable objects. The search over goal
-//! orders proves nothing: it only yields plans, each of which was executed happening by happening.
+//! The greedy search (`greedy`) usually expands each state only once, regardless of its times. It
+//! therefore rarely changes how actions are distributed among interchangeable objects. The search over
+//! goal orders proves nothing: it only yields plans, each of which was executed happening by happening.
 //!
 //! A short plan results from executing the executable actions of a relaxed plan, as in \[4\],
-//! repeatedly. If this leads to a known state, or no action is executable, best-first search by the
+//! repeatedly. If this leads to a visited state, or no action is executable, best-first search by the
 //! size of the relaxed plan continues \[5\].
 //!
 //! \[1\] R. Graham: Bounds on multiprocessing timing anomalies, SIAM Journal on Applied Mathematics
@@ -58,7 +58,6 @@ const MAX_STALE: u64 = 200_000;
 /// Number of neighbouring orders, per goal, without a better plan after which the best order is
 /// perturbed.
 const NEIGHBOURS: usize = 12;
-/// Number of random moves of a perturbation.
 const KICK: usize = 3;
 /// The states of an order may take at most 1/`MEMORY_FRACTION` of the memory limit.
 const MEMORY_FRACTION: usize = 8;
@@ -113,9 +112,9 @@ pub(super) struct GoalOrders<'a, T: TimeNumber = Int> {
 
 impl<'a, T: TimeNumber> GoalOrders<'a, T> {
     /// Prepares the search with three initial orders of the goals: by increasing time, by index, and by
-    /// decreasing time of a timed relaxed plan. `seed` selects the perturbations. Returns `None` if there is
-    /// no goal fact to order, a goal is unreachable, the metric does not depend on the makespan, the states
-    /// would take too much memory, or a limit is reached.
+    /// decreasing time, where the time of a goal is that of a timed relaxed plan for this goal alone. `seed`
+    /// selects the perturbations. Returns `None` if there is no goal fact to order, a goal is unreachable, the
+    /// metric does not depend on the makespan, the states would take too much memory, or a limit is reached.
     pub(super) fn new(
         concurrent: &'a TemporalTask<T>,
         expansion: &'a Expansion<'a, T>,
@@ -164,8 +163,6 @@ impl<'a, T: TimeNumber> GoalOrders<'a, T> {
         })
     }
 
-    /// Returns `true` if the search has ended: many orders gave no plan at all, no better plan was found for
-    /// long, or the task has a single goal whose plan is found.
     pub(super) fn is_over(&self) -> bool {
         self.best.is_none() && self.failures >= MAX_FAILURES
             || self.best.is_some() && self.goals.len() < 2 && self.initial.is_empty()
@@ -383,8 +380,8 @@ fn key<T: TimeNumber>(TemporalState { state, clocks, .. }: &TemporalState<T>) ->
     hasher.finish()
 }
 
-/// Extends a sequence of happenings until a goal is reached, by executable parts of relaxed plans. Returns
-/// `None` if the goal is not reached within the limits.
+/// Extends a sequence of happenings until a goal is reached: by executable parts of relaxed plans, or by
+/// best-first search if they make no progress. Returns `None` if the goal is not reached within the limits.
 fn achieve<T: TimeNumber>(
     relaxation: &mut TimedRelaxation<'_, T>,
     (concurrent, expansion): (&TemporalTask<T>, &Expansion<'_, T>),

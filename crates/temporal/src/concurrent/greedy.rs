@@ -6,8 +6,8 @@
 //! directly follows its start in the sequence, apart from timed initial literals. Far fewer states remain,
 //! and most tasks still have a plan; actions can still overlap in time. Among states with the same facts,
 //! running actions and numbers (without those of the metric), only the first one is expanded, or in mode
-//! `Sooner` each one with a smaller lower bound on the makespan. So this search may miss plans and proves
-//! nothing.
+//! `Sooner` each one with a smaller lower bound on the makespan. This search may therefore miss plans, and
+//! proves nothing.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010.
 //! \[2\] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
@@ -53,7 +53,6 @@ pub(super) enum Mode {
     /// The end of an action directly follows its start in the sequence; only timed initial literals can come
     /// in between. Actions that do not interfere may still overlap in time.
     Sequential,
-    /// Starts and ends are separate successors.
     Overlapping,
     /// Like `Overlapping`, with two additions. A state reached again with a smaller lower bound on
     /// the makespan is expanded again. Successors in which an over-all condition is violated until a

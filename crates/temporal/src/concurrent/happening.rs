@@ -59,10 +59,10 @@ pub(super) struct Instance<T: TimeNumber = Int> {
     pub(super) most: u32,
     /// Fact that the action is running. `None` if at most one simultaneous run can be useful.
     pub(super) under_way: Option<Fact>,
-    /// Whether several simultaneous runs can be useful, but a run whose end does not change the
-    /// state is useless.
+    /// `true` if several simultaneous runs can be useful, but a run whose end does not change the state is
+    /// useless.
     pub(super) counts_by_end: bool,
-    /// Whether the end can directly follow its start in every sequence of happenings without loss
-    /// of completeness.
+    /// `true` if the end can directly follow its start in every sequence of happenings without loss of
+    /// completeness.
     pub(super) compressible: bool,
 }

@@ -108,7 +108,6 @@ fn path<T: TimeNumber>(concurrent: &TemporalTask<T>, goal: Fact, setting: &[Oper
     Path { variable: variable.index(), left: distances }
 }
 
-/// Returns, for each variable, the operators that set it, in ascending order.
 fn setting(task: &Task) -> Vec<Vec<OperatorId>> {
     let mut setting: Vec<Vec<OperatorId>> = vec![Vec::new(); task.variables.len()];
     for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {

@@ -92,7 +92,6 @@ pub(super) fn split(metric: &Metric) -> Result<(Rational, Metric), Error> {
     Ok((weight, Metric { expression: without_time(&metric.expression), ..metric.clone() }))
 }
 
-/// Returns the source location of a quotient whose divisor is the number 0.
 fn zero_divisor(expression: &Expression) -> Option<Place> {
     match expression {
         Expression::Quotient(left, right, place) => match &**right {

@@ -214,7 +214,6 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         self.open.is_empty()
     }
 
-    /// Returns `true` if the search uses more than half of the memory limit.
     pub(super) fn is_full(&self, limits: &Limits) -> bool {
         let open = self.open.len().saturating_mul(size_of::<Priority<T>>());
         self.store.bytes().saturating_add(open) > limits.room() / 2

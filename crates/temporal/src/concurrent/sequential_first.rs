@@ -40,7 +40,6 @@ const OPERATORS: usize = 100_000;
 const WORK: u64 = 1_000;
 /// States that the optimal search may store per evaluation of the greedy temporal search.
 const STATES: usize = 4;
-/// Upper limit on the number of stored states of the optimal search.
 const MOST_STATES: usize = 1_000_000;
 
 type Call = (String, Vec<String>);
@@ -138,8 +137,8 @@ fn call(task: &Task, operator: &Operator, choice: &[u32]) -> Call {
     (task.schema_names[operator.schema as usize].clone(), arguments(task, operator, choice))
 }
 
-/// Runs a satisficing and an optimal search for sequential plans. The optimal search is faster if
-/// the heuristics of the satisficing search are misleading.
+/// Runs a satisficing and an optimal search for sequential plans. The optimal search may be faster if the
+/// heuristics of the satisficing search are misleading.
 pub(super) struct SequentialPlanner<'w> {
     whole: &'w SequentialTask,
     limits: &'w Limits,
@@ -164,7 +163,7 @@ impl<'w> SequentialPlanner<'w> {
     }
 
     /// Resumes both searches for the work that corresponds to `situations` evaluations of the greedy temporal
-    /// search. Returns the better of their plans, or `None` if neither search has a plan that is executable
+    /// search. Returns the better of their plans, or `None` if neither search yields a plan that is executable
     /// in the temporal task.
     pub(super) fn run<T: TimeNumber>(
         &mut self,

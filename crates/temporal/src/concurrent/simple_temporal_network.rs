@@ -82,14 +82,14 @@ pub(super) struct Happening<'h, T: TimeNumber = Int> {
     /// Access kinds that the happening must follow, each with the required distance.
     pub(super) after: &'h [(Key, T)],
     pub(super) marks: &'h [Key],
-    /// Whether several simultaneous happenings can maintain the instance's over-all condition jointly,
+    /// `true` if several simultaneous happenings can maintain the instance's over-all condition jointly,
     /// because it has a disjunction, a comparison or a derived fact.
     pub(super) joint: bool,
     /// Returns `true` if the happening writes an atom or number in an over-all condition that several
     /// simultaneous happenings can maintain jointly. The argument is the instance with this condition.
     pub(super) touches: &'h dyn Fn(u32) -> bool,
     pub(super) changes: &'h [u32],
-    /// Whether the over-all conditions of all running actions hold after the happening.
+    /// `true` if the over-all conditions of all running actions hold after the happening.
     pub(super) settled: bool,
 }
 
@@ -173,7 +173,6 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
         self.change(variable).map(|time| time.base)
     }
 
-    /// Earliest possible time of the latest access of each kind.
     pub(super) fn accesses(&self) -> impl Iterator<Item = (Key, T)> {
         self.entries.iter().map(|(key, time)| (*key, time.base))
     }

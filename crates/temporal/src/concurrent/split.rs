@@ -51,22 +51,19 @@ pub(super) struct Origin {
 
 pub(super) struct Split {
     pub(super) lifted: Lifted,
-    /// Schemas of the original domain.
     pub(super) schemas: Vec<Schema>,
-    /// Origin of each schema of the split task.
     pub(super) origins: Vec<Origin>,
-    /// Design parameters of each schema of the split task.
     pub(super) designs: Vec<Vec<SlotParameter>>,
     pub(super) events: Vec<Event>,
     /// Functions whose values are state-dependent or chosen durations.
     pub(super) durations: Vec<FunctionId>,
-    /// Per schema of the domain: whether the planner chooses its duration.
+    /// Per schema of the domain: `true` if the planner chooses its duration.
     pub(super) chosen: Vec<bool>,
     /// Per schema of the domain: static divisor of its duration. The duration is the value of the
     /// duration fluent, divided by this expression. `None` for no division.
     pub(super) divisors: Vec<Option<Expression>>,
-    /// Whether the split task keeps every optimal plan. `false` if a duration was fixed although the planner
-    /// could choose it, or if durations are chosen and a condition contains a strict comparison.
+    /// `false` if the split task may lose optimal plans, because a duration was fixed although the planner could
+    /// choose it, or because durations are chosen and a condition contains a strict comparison.
     pub(super) is_exact: bool,
 }
 

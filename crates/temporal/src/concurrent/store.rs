@@ -26,7 +26,7 @@ struct Field {
 pub(super) struct Origin {
     pub(super) parent: u32,
     pub(super) operator: OperatorId,
-    /// Whether the same step also applied the end of the started action.
+    /// `true` if the same step also applied the end of the started action.
     pub(super) compressed: bool,
     pub(super) together: bool,
     /// Number of happenings on the path from the root.
@@ -72,7 +72,7 @@ impl PackedNode {
 pub(super) struct Store<'a, T: TimeNumber = Int> {
     concurrent: &'a TemporalTask<T>,
     packing: Packing<'a, T>,
-    /// Whether a larger value of a number is never worse.
+    /// `true` if a larger value of a number is never worse.
     monotone: bool,
     places: Vec<Place>,
     table: HashTable<u32>,

@@ -35,15 +35,15 @@ pub(super) struct TemporalRelaxation {
     pub(super) first: Vec<Proposition>,
     pub(super) propositions: usize,
     pub(super) needs: Lists,
-    /// Propositions that must hold from the start of the action to this rule, which is its end; see [`Rule`].
+    /// Propositions that must hold from the start of an action to the rule of its end. Empty for other rules; see [`Rule`].
     pub(super) over_all: Lists,
     /// Number of conditions of each rule.
     pub(super) unmet: Vec<u32>,
     /// Rules without entries in `needs`.
     pub(super) free: Vec<u32>,
     pub(super) adds: Lists,
-    /// Numeric conditions whose linear expressions each rule increases, with the amounts. An amount
-    /// is `None` if it depends on the state.
+    /// Numeric conditions whose linear expressions each rule may increase, with the amounts. An amount is `None`
+    /// if it depends on the state.
     pub(super) raises: Vec<Box<[NumericEffect]>>,
     pub(super) weights: Vec<u32>,
     /// Operator from which each rule was made; `None` for the rules of clauses and derived facts.
@@ -302,7 +302,6 @@ impl<'a> RelaxationBuilder<'a> {
         add_conjunctions(&mut Scope { rules, goal, variables: &variables, propositions })
     }
 
-    /// Computes `raises` of all rules.
     fn raise(&mut self, task: &Task) {
         let mut mentioning: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
         for (index, numeric) in (0..).zip(&self.numeric) {

@@ -45,7 +45,6 @@ impl ConcurrentTask {
 
 #[cfg(test)]
 impl ConcurrentTask {
-    /// Returns the task with narrow times. Panics if the times are wide.
     pub(super) fn narrow(self) -> TemporalTask {
         let Width::Narrow(task) = self.0 else { panic!("the times are wide") };
         *task
@@ -68,10 +67,9 @@ pub(super) struct TemporalTask<T: TimeNumber = Int> {
     pub(super) instances: Vec<Instance<T>>,
     /// Time (in internal units) and operator of each group of simultaneous timed initial literals, ascending.
     pub(super) events: Vec<(T, OperatorId)>,
-    /// By key of an access kind (such as deleting a certain atom): its guard, if there is one.
-    /// Every happening that must wait for such an access, except timed initial literals, requires a
-    /// value of the guard variable. Accesses that are at least the separation before the latest
-    /// change of their guard delay no later happening.
+    /// By key of an access kind (such as deleting a certain atom): its guard variable, if any. Every happening
+    /// that must wait for such an access, except timed initial literals, requires a value of the guard.
+    /// Accesses that are at least the separation before the latest change of their guard delay no later happening.
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure<T>,
     /// Per preference that can be violated: operators of which at least one is applicable in the
@@ -79,12 +77,12 @@ pub(super) struct TemporalTask<T: TimeNumber = Int> {
     pub(super) violations: Vec<Vec<OperatorId>>,
     /// Deadlines of trajectory constraints, which are checked on complete plans.
     pub(super) deadlines: Vec<Deadline<T>>,
-    /// Whether the search covers every plan with all its possible times, so that exhausting the
-    /// search is a proof.
+    /// `true` if the search covers every plan with all its possible times, so that exhausting the search is a
+    /// proof.
     pub(super) is_exact: bool,
-    /// Whether the heuristic lower bounds hold for every plan. If not, 0 is the only lower bound.
+    /// `true` if the heuristic lower bounds hold for every plan. Otherwise, 0 is the only lower bound.
     pub(super) is_bounded: bool,
-    /// Whether the search minimises the whole metric, not only a part.
+    /// `false` if the search minimises only a part of the metric.
     pub(super) is_whole: bool,
     /// Least distance between interfering happenings, in internal time units.
     pub(super) separation: T,
@@ -139,7 +137,7 @@ struct Parts<'p> {
     builder: Builder<'p>,
     fixed: StaticDurations,
     unit: Unit,
-    /// Whether an action has several starts or ends.
+    /// `true` if an action has several starts or ends.
     has_cases: bool,
 }
 

@@ -153,7 +153,6 @@ impl TimeNumber for Int {
     }
 }
 
-/// Number of 64-bit words of a wide integer.
 const WORDS: usize = 8;
 const BYTES: usize = WORDS * 8;
 

@@ -69,7 +69,7 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
     separation: Time,
     /// Times are rounded to multiples of 2^`shift` internal time units.
     shift: u64,
-    /// For each proposition: the time from which it holds, and the number of actions of its relaxed plan.
+    /// For each proposition: the time from which it holds, and an estimate of the number of actions of its relaxed plan.
     values: Vec<(Time, u32)>,
     /// Rule that adds each proposition, and the number of its repetitions.
     supporters: Vec<Option<(u32, u32)>>,

@@ -1,4 +1,4 @@
-//! Internal unit of time: small enough that all times of a task are integers.
+//! Internal unit of time: small enough that all times of a task, except chosen durations, are integers.
 
 use num_bigint::BigInt;
 use num_integer::Integer as _;
@@ -22,7 +22,7 @@ pub(super) struct StaticDurations {
     pub(super) divisors: FxHashMap<OperatorId, Rational>,
 }
 
-/// Number of internal time units per PDDL time unit. All times are integers in internal units.
+/// Number of internal time units per PDDL time unit. All times, except chosen durations, are integers in internal units.
 #[derive(Debug, Clone)]
 pub(super) struct Unit(pub(super) BigInt);
 

@@ -87,7 +87,6 @@ pub(super) fn is_exact(concurrent: &TemporalTask) -> bool {
             .all(|instance| instance.joint.is_empty() && is_decided(instance) && takes_time(instance))
 }
 
-/// Searches for a plan with the least metric, until all sequences are searched or a limit is reached.
 pub(super) fn optimize(concurrent: &TemporalTask, limits: &Limits, mut record: Record<'_>) -> Solution {
     let span = info_span!("optimize", operators = concurrent.task.operators.len());
     let (is_over, lower, best) = span.in_scope(|| take_turns_choosing(concurrent, limits, &mut record));

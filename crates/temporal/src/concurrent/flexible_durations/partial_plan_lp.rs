@@ -136,8 +136,8 @@ impl Course {
         runs.nth(run as usize)
     }
 
-    /// Possible ends of running actions, each with the index of the run. If all runs of an instance
-    /// have the same duration, only the first one can end.
+    /// Possible ends of running actions, each with the index of the run. Runs of an instance without a duration
+    /// variable have equal durations, so only the first of them can end.
     pub(super) fn ends(&self, concurrent: &TemporalTask) -> impl Iterator<Item = (OperatorId, u32)> {
         let mut before: Option<(u32, u32)> = None;
         let runs = self.instances().map(move |instance| {
@@ -447,7 +447,6 @@ impl Course {
         self.program.value(&self.value_of_plan(concurrent))
     }
 
-    /// Positions in the sequence of the starts of actions with chosen durations.
     pub(super) fn chosen(&self, concurrent: &TemporalTask) -> impl Iterator<Item = usize> {
         let roles = self.passed.iter().map(|passed| concurrent.happenings[passed.operator.index()].role);
         let positions = roles.enumerate().filter(|(_, role)| chosen(concurrent, *role).is_some());

@@ -101,7 +101,6 @@ impl<'a> Search<'a> {
         open.into_iter().chain(&self.reached).min().cloned()
     }
 
-    /// Returns `true` if the search uses more than a quarter of the memory limit.
     pub(super) fn is_full(&self, limits: &Limits) -> bool {
         let queued = self.queues.iter().map(BinaryHeap::len).fold(0, usize::saturating_add);
         let queued = queued.saturating_mul(size_of::<QueueEntry>());
