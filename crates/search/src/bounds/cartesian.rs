@@ -34,7 +34,7 @@ const MAX_SET_BYTES: usize = 1 << 26;
 
 /// Part of a task for one abstraction, defined by its goal states.
 pub(super) struct Subtask {
-    /// All these facts must hold in a goal state.
+    /// A state in which all these facts hold is a goal state.
     pub(super) goals: Vec<Fact>,
     /// A state in which one of these facts holds is a goal state, too.
     pub(super) unreachable: Vec<Fact>,

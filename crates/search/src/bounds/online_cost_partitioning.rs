@@ -216,6 +216,7 @@ impl OnlineCostPartitioning {
         };
         let is_better = value > estimate;
         self.failures = if is_better { 0 } else { (self.failures + 1).min(10) };
+        // The pause doubles after each order in a row that is not kept.
         let pause = (self.order_work * ORDER_SHARE / WORK_PER_EVALUATION).max(1) << self.failures;
         self.next_order = self.evaluations.saturating_add(pause);
         if is_better {

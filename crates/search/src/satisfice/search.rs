@@ -290,6 +290,7 @@ impl<N: TaskNumber> Search<N> {
         let keys = Keys {
             ff_value: value(ff_value),
             landmarks: has_landmarks.then(|| value(landmarks)),
+            // There are far fewer than 2^31 landmarks, so the three fields do not overlap.
             novelty: u64::from(!is_novel) << 63 | u64::from(landmark_count) << 32 | u64::from(ff_value),
         };
         for (operator, times) in std::mem::take(&mut context.explorer.repeated) {

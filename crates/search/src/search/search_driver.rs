@@ -279,6 +279,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         if ended.is_empty() && until >= ABANDON_WORK {
             ended.extend(behind);
         }
+        // Positions are removed in descending order, so the other positions remain valid.
         for position in ended.into_iter().rev() {
             let search = self.searches.remove(position);
             self.figures = self.figures.plus(search.statistics);

@@ -223,6 +223,7 @@ impl StubbornSetPruning {
                 return true;
             }
             let count = stubborn.setting.of(*number).len();
+            // Fewer achievers usually yield a smaller stubborn set.
             if best.is_none_or(|(least, _)| count < least) {
                 best = Some((count, *number));
             }

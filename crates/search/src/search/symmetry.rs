@@ -42,6 +42,7 @@ impl Orbits {
                 let values = facts.iter().map(|fact| fact.value).collect();
                 moves.push(Move { target: first.variable.index(), source, values });
             }
+            // `canonicalize` compares images lexicographically by target variable.
             moves.sort_by_key(|step| step.target);
             exchanges.push(moves);
         }

@@ -246,7 +246,7 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
         }
     }
 
-    /// Earliest time of an operator after the happenings that have taken place.
+    /// Earliest time at which the interference constraints with past happenings admit an operator.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"
@@ -259,7 +259,7 @@ impl<'a, T: TimeNumber> CriticalPath<'a, T> {
 }
 
 /// Returns, for each proposition, the access kinds that all happenings adding it have in common,
-/// ascending. Empty for propositions that follow from others.
+/// ascending. Empty for propositions of clauses and derived facts, which no happening adds.
 fn common_marks<T: TimeNumber>(
     concurrent: &TemporalTask<T>,
     relaxation: &TemporalRelaxation,

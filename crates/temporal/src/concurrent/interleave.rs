@@ -61,7 +61,7 @@ pub(super) fn interleave_searches<T: TimeNumber>(
         let guidance = RelaxedPlanHeuristic::new(&relaxed);
         Greedy::new(concurrent, &expansion, &estimate, bounds, guidance, mode)
     };
-    // If all actions are compressible, sequential mode equals overlapping mode.
+    // If all actions are compressible, sequential mode hardly differs from overlapping mode.
     let differs = concurrent.instances.iter().any(|instance| !instance.compressible);
     let mut greedy = vec![begin(Mode::Overlapping)];
     greedy.extend(differs.then(|| begin(Mode::Sequential)));

@@ -195,6 +195,7 @@ impl<'a> RelaxedPlanHeuristic<'a> {
             let Some(proposition) = stack.pop() else { break };
             rules.extend(self.supporters[proposition as usize].take());
         }
+        // Of several rules of an operator, only the largest cost counts.
         used.sort_unstable_by_key(|(origin, times)| (*origin, Reverse(*times)));
         used.dedup_by_key(|(origin, _)| *origin);
         preferred.sort_unstable();

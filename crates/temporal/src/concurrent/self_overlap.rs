@@ -368,8 +368,8 @@ fn is_plain(operator: &Operator) -> bool {
     operator.conditional.is_empty() && operator.cost.tables.is_empty() && operator.cost.constant >= 0
 }
 
-/// Returns `true` if only the end of a run has relevant effects, and ending another run has no
-/// further effect.
+/// Returns `true` if only the end of a run has relevant effects, and the end of a second run changes nothing
+/// more.
 fn counts_by_end<T: TimeNumber>(
     task: &Task,
     own: &Instance<T>,

@@ -92,6 +92,7 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
 
 /// Converts a time to units of 2^`shift` internal time units, rounded down.
 fn time<T: TimeNumber>(time: T, shift: u64) -> Time {
+    // A saturated time is below `NEVER`, so it still counts as reachable.
     Time::try_from(time.shifted_down(shift)).unwrap_or(NEVER / 4)
 }
 

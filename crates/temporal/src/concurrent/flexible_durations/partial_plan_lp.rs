@@ -263,7 +263,7 @@ impl Course {
     }
 
     /// Adds the constraint that the duration in `column` is at least `least`, and stores the bounds of the
-    /// duration that follow from single `constraints`. Returns `None` if the bounds contradict each other.
+    /// duration that single constraints imply. Returns `None` if the bounds contradict each other.
     fn note_range(&mut self, column: Column, least: Rational, constraints: &mut Vec<Affine>) -> Option<()> {
         constraints.push(Affine::column(column).shifted(&-least.clone()));
         let (mut low, mut high) = (least, None);
@@ -297,9 +297,9 @@ impl Course {
         Some(sum)
     }
 
-    /// Appends a happening, and adds its temporal constraints: mainly, it is after earlier happenings
-    /// and before the ends of running actions that interfere with it. Returns `None` if a constraint
-    /// is certainly violated.
+    /// Appends a happening with its temporal constraints. Above all, the happening follows the earlier happenings
+    /// and precedes the ends of running actions that interfere with it. Returns `None` if a constraint is certainly
+    /// violated.
     fn pass(
         &mut self,
         concurrent: &TemporalTask,
