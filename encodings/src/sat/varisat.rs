@@ -199,7 +199,6 @@ enum Part {
 struct Steps {
     part: Part,
     number: u128,
-    /// Number of bytes of `number` that were read.
     bytes: u32,
 }
 

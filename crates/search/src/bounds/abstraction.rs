@@ -12,7 +12,6 @@ use task::number::dense;
 
 use crate::bounds::pattern_database::Projection;
 
-/// Goal distance of an abstract state from which no goal state is reachable.
 pub(super) const UNREACHABLE: u32 = u32::MAX;
 /// Upper limit on goal distances, so that the sum over [`MAX_ABSTRACTIONS`] abstractions does not overflow.
 pub(super) const MAX_DISTANCE: u32 = 1 << 23;
@@ -30,7 +29,6 @@ pub(super) struct Split {
 
 #[derive(Clone)]
 pub(super) enum SplitNode {
-    /// An abstract state.
     Leaf(u32),
     Inner(Split),
 }

@@ -46,7 +46,6 @@ pub(super) struct RefinementLimits {
     pub(super) work: u64,
 }
 
-/// Position of the value set of a variable in the words of an abstract state.
 struct ValueSetField {
     start: usize,
     /// Number of words; 1 if the variable shares its word with other variables.
@@ -56,7 +55,6 @@ struct ValueSetField {
     size: u32,
 }
 
-/// A transition to or from another abstract state.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Edge {
     state: u32,
@@ -97,7 +95,6 @@ struct Refinement<'a> {
     work: u64,
 }
 
-/// Returns, for each basic variable, the operators that may change it.
 pub(super) fn operators_by_effect(task: &Task) -> Vec<Vec<u32>> {
     let mut by_effect = vec![Vec::new(); task.basic];
     for (operator, index) in task.operators.iter().zip(0..) {
@@ -526,7 +523,6 @@ impl<'a> Refinement<'a> {
     }
 }
 
-/// Removes the transitions to or from `state` from the lists of the states at the other ends of `edges`.
 fn remove_edges(lists: &mut [Vec<Edge>], edges: &[Edge], state: u32) {
     let mut neighbours: Vec<u32> = edges.iter().map(|edge| edge.state).collect();
     neighbours.sort_unstable();
@@ -537,7 +533,6 @@ fn remove_edges(lists: &mut [Vec<Edge>], edges: &[Edge], state: u32) {
 }
 
 impl ValueSetField {
-    /// Returns the word within an abstract state and the bit of a value.
     #[expect(clippy::arithmetic_side_effects, reason = "bits of a word, and words in memory")]
     fn bit(&self, value: u32) -> (usize, u64) {
         let position = self.shift + value;

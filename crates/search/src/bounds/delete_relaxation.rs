@@ -29,7 +29,6 @@ impl Lists {
         self.ends.push(dense(self.all.len()));
     }
 
-    /// Returns the inverse relation: for each value below `count`, the indices of the lists that contain it.
     fn inverse(&self, count: usize) -> Self {
         let mut positions: Vec<Vec<u32>> = vec![Vec::new(); count];
         for list in 0..dense(self.ends.len()) {

@@ -22,7 +22,6 @@ use crate::bounds::delete_relaxation::{ALWAYS, DeleteRelaxation, GOAL};
 /// Work units after which [`landmark_cut_bound`] ends and returns the sum over the landmarks found
 /// until then.
 const MAX_WORK: u64 = 100_000_000;
-/// Work units per visited fact or rule.
 const WORK_PER_VISIT: u64 = 8;
 const UNREACHABLE: u64 = u64::MAX;
 const NONE: u32 = u32::MAX;

@@ -51,7 +51,6 @@ pub struct OnlineCostPartitioning {
     /// For each abstraction: for each abstract state, a row of `stride` goal distances. The first is the distance
     /// under the full costs, the others under the shares of cost partitionings.
     tables: Vec<Vec<u32>>,
-    /// Number of rows of all tables.
     rows: usize,
     /// Number of abstract states and transitions of all abstractions.
     transitions: usize,
@@ -66,7 +65,6 @@ pub struct OnlineCostPartitioning {
     scratch: Scratch,
     sums: Vec<u32>,
     work: u64,
-    /// Work units of the computation of an order.
     order_work: u64,
     evaluations: u64,
     next_order: u64,
@@ -188,7 +186,6 @@ impl OnlineCostPartitioning {
         result
     }
 
-    /// Returns the work units already done, including those for the abstractions.
     pub(crate) fn work(&self) -> u64 {
         self.work
     }

@@ -23,7 +23,6 @@ pub struct Projection {
     sizes: Vec<usize>,
     initial: u32,
     goals: Vec<u32>,
-    /// Result of [`operator_costs`].
     costs: Arc<[Int]>,
     /// Operators with transitions, ascending, each with the end of its transitions in `transitions`. An
     /// operator has none if it neither requires a fact of the pattern nor may change the pattern. In a large
@@ -51,7 +50,6 @@ pub(super) fn operator_costs(task: &Task) -> Arc<[Int]> {
 }
 
 impl Projection {
-    /// Computes a projection. `costs` are as returned by [`operator_costs`].
     pub(super) fn new(
         context: Context<'_>,
         pattern: Vec<VariableId>,
@@ -120,7 +118,6 @@ impl Projection {
         &self.goals
     }
 
-    /// Returns the position of an operator in `operators`, or `None` if it has no transitions.
     fn place(&self, operator: usize) -> Option<usize> {
         self.operators.binary_search_by_key(&operator, |(candidate, _)| *candidate).ok()
     }

@@ -25,7 +25,6 @@ pub(super) type Proposition = u32;
 
 pub(super) const NO_OPERATOR: u32 = u32::MAX;
 
-/// A linear expression, and all thresholds with which conditions compare it.
 pub(super) struct NumericCondition<N> {
     pub(super) sum: Vec<(NumericId, N)>,
     /// For each comparison: the threshold, a flag that is `true` for > and `false` for ≥, and its

@@ -19,7 +19,6 @@ const MAX_COST: u32 = 1 << 30;
 /// Upper limit on the assumed number of repetitions of an operator until a numeric comparison holds.
 const MAX_REPETITIONS: f64 = 10_000.0;
 
-/// Achiever of a proposition, and the number of its applications until the proposition holds.
 #[derive(Debug, Clone, Copy)]
 struct Supporter {
     node: u32,
@@ -30,7 +29,6 @@ struct Supporter {
 struct NodeProgress {
     /// Number of unreached conditions.
     left: u32,
-    /// Sum of the costs of the reached conditions.
     sum: u32,
 }
 
@@ -38,7 +36,6 @@ pub(super) struct FfHeuristic {
     costs: Vec<u32>,
     supporters: Vec<Supporter>,
     progress: Vec<NodeProgress>,
-    /// Values of `progress` before any condition is reached.
     initial_progress: Vec<NodeProgress>,
     /// Nodes without conditions.
     unconditional: Vec<u32>,

@@ -314,7 +314,6 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         side
     }
 
-    /// Returns the effects of a node, including the unconditional effects of its operator.
     fn all_effects(&self, node: u32) -> Vec<Proposition> {
         let mut effects = self.relaxation.effects.of(node).to_vec();
         let operator = self.relaxation.operators[node as usize];

@@ -16,9 +16,7 @@ use rustc_hash::FxHashMap;
 use crate::satisfice::delete_relaxation::Proposition;
 
 pub(super) struct NoveltyTable {
-    /// Number of words of the bitset of a partition.
     stride: usize,
-    /// Position of the bitset of each partition in `seen`, in words.
     positions: FxHashMap<(u32, u32), usize>,
     seen: Vec<u64>,
 }

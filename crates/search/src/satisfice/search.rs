@@ -48,7 +48,6 @@ pub(super) enum SearchGoal<N> {
 
 struct Node<N> {
     parent: u32,
-    /// Index of the step (operator with designs) that leads from the parent to this node.
     step: u32,
     cost: N,
     /// Path cost in the integer operator costs of the search (`Search::prices`).

@@ -100,7 +100,6 @@ impl StepOrder {
     }
 }
 
-/// Returns the variables that a step reads, and those that it assigns.
 fn accesses<N: TaskNumber>(task: &Task<N>, step: &GroundStep) -> (Vec<VariableKey>, Vec<VariableKey>) {
     let operator = &task.operators[step.operator.index()];
     let condition = &operator.condition;

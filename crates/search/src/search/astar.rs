@@ -132,7 +132,6 @@ pub struct AStar<'a, N, E> {
     /// Cost of the best known plan (the incumbent), or a cost limit set by the caller. More expensive nodes
     /// are pruned.
     limit: Option<N>,
-    /// `true` if the incumbent was found by another component of the planner.
     incumbent_is_external: bool,
     /// Number of steps of the incumbent if this search found it. Nodes of equal cost must lead to shorter
     /// plans.
@@ -456,8 +455,6 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.best.map(|goal| self.plan(goal))
     }
 
-    /// Returns the operators to apply in the current state, in ascending order: those whose propositional
-    /// conditions hold, without those that stubborn sets exclude.
     fn applicable(&mut self) -> Vec<OperatorId> {
         let mut applicable = self.prepared.index.applicable(self.task, &self.state);
         if let Some(choosing) = &mut self.pruning {

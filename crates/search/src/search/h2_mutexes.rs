@@ -25,7 +25,6 @@ type Words = Vec<u64>;
 
 struct Rule {
     before: Vec<u32>,
-    /// Facts that certainly hold after the operator.
     after: Vec<u32>,
     adds: Vec<u32>,
     /// All facts of the variables that the operator certainly sets.
@@ -172,7 +171,6 @@ impl MutexPairs {
         Ok(alive.map(|alive| Self { first: builder.first, alive, useless }))
     }
 
-    /// Returns `true` if it is proved that no plan can use the operator.
     pub(crate) fn is_operator_useless(&self, operator: OperatorId) -> bool {
         self.useless[operator.index()]
     }

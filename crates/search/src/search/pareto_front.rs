@@ -20,7 +20,6 @@ pub(super) trait Criteria {
     /// may break ties by further criteria.
     fn dominates(&self, one: u32, other: u32) -> bool;
 
-    /// Replaces the contents of `to` by the numbers of a label, one for each criterion.
     fn numbers(&self, label: u32, to: &mut Vec<u32>);
 }
 

@@ -32,8 +32,6 @@ pub struct SuccessorGenerator {
 /// Required values as pairs (variable, value) in ascending order, and the operator.
 type Precondition = (Vec<(u32, u32)>, OperatorId);
 
-/// A subtree to be built: a range of operators with equal first `depth` preconditions, and the link
-/// to its root.
 struct PendingSubtree {
     from: usize,
     to: usize,

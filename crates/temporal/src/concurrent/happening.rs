@@ -6,7 +6,6 @@ use task::task::{Fact, NumericId, OperatorId};
 use crate::concurrent::interference::{Designs, InterferenceConstraints};
 use crate::concurrent::time_number::TimeNumber;
 
-/// Part of an action that an operator of the split task executes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Role {
     /// Start of the durative action with this instance index.

@@ -362,8 +362,6 @@ fn mentions(operator: &Operator, variable: VariableId) -> bool {
     facts.into_iter().any(|fact| fact.variable == variable)
 }
 
-/// Returns `true` if an operator has no conditional effects and a constant cost that is not
-/// negative.
 fn is_plain(operator: &Operator) -> bool {
     operator.conditional.is_empty() && operator.cost.tables.is_empty() && operator.cost.constant >= 0
 }

@@ -20,7 +20,6 @@ use task::number::dense;
 use crate::concurrent::duration_fluents::{Timer, depends_on_state};
 use pddl::ast::{Comparison, Name, Span};
 
-/// Part of an action of the domain that a schema of the split task represents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Half {
     Start,
@@ -236,7 +235,6 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
     }
 }
 
-/// Adds an auxiliary predicate. `running` is `true` for predicates that mark running actions.
 fn symbol(lifted: &mut Lifted, name: &str, arity: usize, running: bool) -> PredicateId {
     let id = PredicateId(dense(lifted.predicates.len()));
     let name = Name::new(name);

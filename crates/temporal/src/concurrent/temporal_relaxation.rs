@@ -51,7 +51,6 @@ pub(super) struct TemporalRelaxation {
     pub(super) needing: Lists,
     pub(super) numeric: Vec<Numeric>,
     pub(super) goal: Vec<Proposition>,
-    /// Index of the rule for the end of each instance.
     pub(super) ends: Vec<u32>,
     /// Propositions of the default values of derived variables, which hold from the beginning.
     pub(super) defaults: Vec<Proposition>,

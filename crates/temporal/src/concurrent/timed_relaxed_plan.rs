@@ -47,7 +47,6 @@ pub(super) struct TimedRelaxedPlan {
 
 #[derive(Debug, Clone, Copy)]
 enum Timing {
-    /// The rule fires as soon as its conditions hold.
     Immediate,
     Start(u32),
     End(u32),

@@ -31,7 +31,6 @@ pub(super) fn time_of(position: usize) -> Column {
     2 * dense(position) + 2
 }
 
-/// Column of the chosen duration of the action that starts at a position in the sequence.
 #[expect(clippy::arithmetic_side_effects, reason = "sequences are shorter than 2^28")]
 pub(super) fn duration_of(position: usize) -> Column {
     2 * dense(position) + 3
