@@ -42,8 +42,8 @@ fn heuristic_values_are_consistent_and_cost_partitionings_add_up() {
     assert!(fleets > 3 && depots > 3, "shares add up for {fleets} fleets and {depots} depots");
 }
 
-/// `a` and `b` exclude each other. Nothing costs anything, so only the pair of both shows it, among more
-/// projections than are evaluated for each state.
+/// `a` and `b` exclude each other, and all costs are 0. Only the projection to both proves the goal unreachable.
+/// There are more projections than are evaluated for each state.
 #[test]
 fn a_projection_that_proves_the_goal_unreachable_is_kept() {
     let domain = "(define (domain d) (:requirements :adl :action-costs)

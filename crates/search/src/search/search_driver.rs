@@ -6,10 +6,10 @@
 //! In `search`, A\* with pattern databases runs first. If it finds no plan soon, a greedy best-first search
 //! provides an upper bound. Then two A\* searches alternate: both use pattern databases, the second also LM-cut.
 //! After some work, they share online cost partitioning; computing its abstractions earlier would take longer
-//! than most proofs. The LM-cut search first gets a quarter of the other's work, and later the same work. A
-//! search whose lower bound lags behind that of the other gets half of its work. The result of the search that
-//! finishes first is returned. Work is counted in units instead of time, so the result without a time limit is
-//! deterministic.
+//! than most proofs. The LM-cut search first gets a quarter of the other's work, and later the same work. After
+//! much work, a search whose lower bound lags behind that of the other gets half of the work. The result of the
+//! search that finishes first is returned. Work is counted in units instead of time, so the result without a
+//! time limit is deterministic.
 
 use std::cell::RefCell;
 use std::rc::Rc;

@@ -19,7 +19,6 @@ pub struct SearchTask<N = Int> {
     /// element is the number of combinations.
     pub(super) numbers: Vec<u32>,
     pub(super) index: SuccessorGenerator,
-    /// Highest cost of a combination of any operator.
     dearest: N,
 }
 

@@ -57,7 +57,6 @@ pub(super) struct ParentLink {
 struct Node {
     place: u32,
     origin: ParentLink,
-    /// Index of the path cost in `numbers`.
     cost: u32,
     next: u32,
     state: NodeStatus,
@@ -103,7 +102,6 @@ pub(super) struct StateRegistry<N> {
     image: Vec<u32>,
 }
 
-/// Data needed to insert a state that no stored state dominates.
 pub(super) struct VacantEntry {
     hash: u64,
     place: Option<u32>,

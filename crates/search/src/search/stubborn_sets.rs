@@ -348,8 +348,6 @@ pub(super) mod tests {
         Some((states, steps))
     }
 
-    /// Cost and length of a cheapest plan with the fewest steps for each state, by a backward
-    /// Dijkstra search.
     pub(in crate::search) fn to_go(
         task: &Task,
         states: &[State],

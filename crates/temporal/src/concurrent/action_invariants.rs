@@ -118,7 +118,6 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         Some(true)
     }
 
-    /// Happenings other than the start and end of `own` that set a variable.
     pub(super) fn setting(
         &self,
         own: &Instance<T>,

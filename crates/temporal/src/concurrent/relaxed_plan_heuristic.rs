@@ -38,7 +38,6 @@ pub(super) struct RelaxedPlanHeuristic<'a> {
     /// For each proposition: cheapest rule that adds it, and number of its applications.
     supporters: Vec<Option<(u32, u32)>>,
     unmet: Vec<u32>,
-    /// For each rule: sum of the costs of its reached conditions.
     sums: Vec<u32>,
     marked: Vec<bool>,
     /// Per numeric condition: amount that is missing. `None` if the expression can have any value, so

@@ -45,7 +45,6 @@ struct Node<T> {
 
 struct Place {
     key: Box<[u32]>,
-    /// Nodes of this place that no other node of the place dominates.
     front: Vec<u32>,
 }
 
