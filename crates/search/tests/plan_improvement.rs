@@ -12,8 +12,6 @@ use testing::{depot, fleet, ground_text, optimum};
 /// Work units for all improvements of one plan.
 const WORK: u64 = 20_000_000;
 
-/// Returns the plan of a random walk, if it reaches the goal. The plan is mostly long and
-/// expensive.
 fn random_plan(task: &Task, random: &mut Random) -> Option<GroundPlan> {
     let (mut state, mut steps) = (task.initial.clone(), Vec::new());
     while !task.is_goal(&state) {

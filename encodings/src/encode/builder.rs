@@ -39,7 +39,6 @@ impl<'a> Builder<'a> {
         Ok(Self { task, limits, formula, variables, most: max_clauses, groups: FxHashMap::default() })
     }
 
-    /// Returns an error if the deadline has passed, the interrupt flag is set, or there are too many clauses.
     pub(super) fn check(&self) -> Result<(), Interrupted> {
         if self.formula.clause_count() > self.most { Err(Interrupted) } else { self.limits.check() }
     }

@@ -60,9 +60,7 @@ struct Source {
     increments: Increments,
 }
 
-/// Encoded cost of the whole plan, minus a lower bound.
 pub(super) struct Cost {
-    /// Lower bound on the cost of every plan.
     lower: Int,
     spent: Spent,
 }

@@ -64,7 +64,6 @@ pub(super) struct Interference {
     /// Exclusion groups, i.e. groups of operators of which at most one may occur at a step.
     exclusions: Vec<Vec<OperatorId>>,
     conflicts: Vec<Conflict>,
-    /// For each operator: index of the first exclusion group that contains it.
     classes: Vec<Option<usize>>,
 }
 

@@ -34,7 +34,6 @@ pub(super) struct Varisat {
     budget: u64,
     conflicts: Rc<Cell<u64>>,
     literals: Vec<varisat::Lit>,
-    /// End of each clause in `literals`.
     ends: Vec<usize>,
     assignment: Vec<bool>,
     core: Vec<Lit>,

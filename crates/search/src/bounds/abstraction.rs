@@ -22,7 +22,6 @@ pub(super) const MAX_ABSTRACTIONS: usize = 256;
 #[derive(Clone)]
 pub(super) struct Split {
     pub(super) variable: u32,
-    /// Bitset of the values.
     pub(super) values: Box<[u64]>,
     pub(super) children: [u32; 2],
 }
@@ -37,7 +36,6 @@ pub(super) enum SplitNode {
 pub(super) struct SplitTree(pub(super) Vec<SplitNode>);
 
 impl SplitTree {
-    /// Returns the abstract state, and the number of visited nodes.
     #[expect(clippy::arithmetic_side_effects, reason = "the depth of a tree in memory")]
     fn state(&self, values: &[u32]) -> (u32, u32) {
         let (mut node, mut depth) = (0, 0);

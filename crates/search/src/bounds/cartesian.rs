@@ -32,7 +32,6 @@ const WORK_PER_VISIT: u64 = 8;
 /// Upper limit on the memory for the value sets of the abstract states of one abstraction, in bytes.
 const MAX_SET_BYTES: usize = 1 << 26;
 
-/// Part of a task for one abstraction, defined by its goal states.
 pub(super) struct Subtask {
     /// A state in which all these facts hold is a goal state.
     pub(super) goals: Vec<Fact>,
@@ -362,7 +361,6 @@ impl<'a> Refinement<'a> {
         }
     }
 
-    /// Returns the split of the variable whose value set is smallest in relation to its domain.
     fn most_refined(&self, candidates: Vec<Flaw>) -> Option<Flaw> {
         candidates.into_iter().min_by(|a, b| {
             let share = |flaw: &Flaw| {
@@ -436,7 +434,6 @@ impl<'a> Refinement<'a> {
         facts.all(|fact| self.may_lead(operator, ends, fact.variable.index()))
     }
 
-    /// Splits an abstract state. The new abstract state has the values of the split.
     fn split(&mut self, flaw: &Flaw) {
         let Flaw { state, variable, ref values } = *flaw;
         let new = dense(self.leaves.len());
@@ -474,7 +471,6 @@ impl<'a> Refinement<'a> {
         self.tree[leaf as usize] = SplitNode::Inner(Split { children, ..split });
     }
 
-    /// Updates the transitions after `new` was separated from `state` by the values of a variable.
     fn rewire(&mut self, state: u32, new: u32, variable: usize) {
         let task = self.task;
         let incoming = std::mem::take(&mut self.incoming[state as usize]);

@@ -28,7 +28,6 @@ use crate::bounds::pattern_database::Projection;
 const MAX_TRANSITIONS: usize = 1_000_000;
 /// Upper limit on the number of transitions of a projection. Greater projections are omitted.
 const MAX_PROJECTION_SIZE: usize = 100_000;
-/// Number of columns of the tables after the first growth.
 const MIN_STRIDE: usize = 8;
 const MAX_PARTITIONINGS: usize = 128;
 /// Divisor: the tables of goal distances may take at most 1/8 of the memory limit.

@@ -29,7 +29,6 @@ pub struct Projection {
     /// task, this holds for nearly all operators, which thus take no memory.
     operators: Vec<(usize, usize)>,
     transitions: Vec<Transition>,
-    /// Minimum cost of the operators without transitions, if there are any.
     idle_cost: Option<Int>,
     to_go: Vec<Option<Int>>,
 }

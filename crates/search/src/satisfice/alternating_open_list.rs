@@ -8,7 +8,6 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-/// A state, and the range of its untried steps in `AlternatingOpenList::steps`.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     state: u32,

@@ -41,12 +41,10 @@ impl<N: TaskNumber> NumericCondition<N> {
 
 #[derive(Debug, Clone)]
 pub(super) struct Achiever {
-    /// Index of the linear expression in `Relaxation::directions`.
     pub(super) direction: u32,
     pub(super) gain: Gain,
 }
 
-/// Increase of an expression per application of an operator.
 #[derive(Debug, Clone)]
 pub(super) enum Gain {
     Constant(f64),

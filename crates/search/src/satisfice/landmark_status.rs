@@ -115,7 +115,6 @@ impl LandmarkStatus {
         count
     }
 
-    /// Marks the propositions of all unreached landmarks whose predecessors are reached as wanted.
     pub(super) fn request_landmark(&mut self, reached: &[u64]) {
         self.request_none();
         for (landmark, index) in self.landmarks.all.iter().zip(0_u32..) {

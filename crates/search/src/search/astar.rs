@@ -85,7 +85,6 @@ pub enum OpenListOrder {
 /// Reaction to a forecast that the search will run out of memory before it can finish.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OutOfMemoryPolicy {
-    /// End the search without a proof.
     None,
     /// Ignore forecasts; the last forecast was favourable, or nothing was forecast.
     Some,

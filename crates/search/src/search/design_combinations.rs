@@ -18,8 +18,6 @@ const COMBINATION_LIMIT: usize = 2_000_000;
 /// another group are added.
 const CHOICE_LIMIT: usize = 100_000;
 
-/// A combination of designs for some slots, and its contributions to the operator's cost and to its
-/// numeric conditions and effects.
 struct Partial<N> {
     choice: Vec<u32>,
     cost: N,

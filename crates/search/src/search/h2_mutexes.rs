@@ -27,7 +27,6 @@ struct Rule {
     before: Vec<u32>,
     after: Vec<u32>,
     adds: Vec<u32>,
-    /// All facts of the variables that the operator certainly sets.
     set: Words,
     /// All facts of the variables that the operator may change and does not require.
     open: Vec<u32>,

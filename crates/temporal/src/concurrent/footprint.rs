@@ -207,7 +207,6 @@ impl WriteIndex {
     }
 }
 
-/// Appends the ids of all rows that match `pattern` to `into`. Without a pattern, all rows match.
 fn matching<V: Copy>(rows: Option<&Rows<V>>, pattern: Option<&[Slot]>, into: &mut Vec<V>) {
     let fits = |arguments: &[ObjectId]| pattern.is_none_or(|pattern| fits(pattern, arguments));
     into.extend(rows.into_iter().flatten().filter(|(arguments, _)| fits(arguments)).map(|(_, value)| *value));

@@ -83,7 +83,6 @@ struct Decoded<T: TimeNumber = Int> {
 
 enum Decoding<T: TimeNumber = Int> {
     Plan(Box<Decoded<T>>, Sequence<T>),
-    /// No plan was found, or the plan is worse than required.
     Failed,
     Interrupted,
 }

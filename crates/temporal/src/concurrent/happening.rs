@@ -8,12 +8,10 @@ use crate::concurrent::time_number::TimeNumber;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Role {
-    /// Start of the durative action with this instance index.
     Start(u32),
     End(u32),
     /// A whole action: instantaneous or of duration 0.
     Whole,
-    /// Timed initial literals: index into the events of the task.
     Timed(u32),
     /// Operator that never happens, for example an over-all condition, or the start or end of an action that
     /// cannot be executed.
@@ -34,7 +32,6 @@ pub(super) struct Happening<T: TimeNumber = Int> {
     pub(super) sets: Vec<u32>,
 }
 
-/// A ground durative action: a pair of a start operator and an end operator.
 #[derive(Debug, Clone)]
 pub(super) struct Instance<T: TimeNumber = Int> {
     pub(super) start: OperatorId,

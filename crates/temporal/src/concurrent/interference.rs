@@ -18,7 +18,6 @@ enum Access {
     Read(AtomId),
     Added(AtomId),
     Deleted(AtomId),
-    /// The atom is read by an over-all condition.
     Held(AtomId),
     ReadNumber(NumericId),
     Changed(NumericId, Way),

@@ -77,7 +77,6 @@ impl<T: TimeNumber> Estimate<T> {
     }
 }
 
-/// Least times to the goal value of a variable, by backward Dijkstra search from the goal value.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "a path takes fewer steps than the variable has values, each a time of at most `TIME_BITS` bits"
@@ -122,8 +121,6 @@ fn setting(task: &Task) -> Vec<Vec<OperatorId>> {
     setting
 }
 
-/// All changes of a variable by the operators that set it, with their least distances from the previous
-/// change.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "durations and the separation have at most `TIME_BITS` bits; setters are counted in memory"

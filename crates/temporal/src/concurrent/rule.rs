@@ -20,7 +20,6 @@ pub(super) struct Rule {
     /// Facts that certainly hold after the rule, because the happening sets their variables. All other values of these
     /// variables are deleted. Empty for clauses and derived facts.
     pub(super) sets: Vec<Proposition>,
-    /// Numeric conditions whose expressions the rule may increase.
     pub(super) raises: Vec<NumericEffect>,
     pub(super) weight: u32,
     /// Operator from which the rule was made; `None` for clauses and derived facts.

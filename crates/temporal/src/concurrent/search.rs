@@ -125,8 +125,6 @@ impl<'a, T: TimeNumber> Search<'a, T> {
         self.floor
     }
 
-    /// Raises lower bounds on the metric and the makespan of plans through a node to the bounds that hold for
-    /// all plans.
     fn at_least(&self, (total, makespan): (T, T)) -> (T, T) {
         // Costs are not negative.
         let floor = self.concurrent.measure.total(self.floor, 0).unwrap_or(T::ZERO);

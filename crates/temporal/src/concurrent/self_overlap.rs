@@ -69,7 +69,6 @@ pub(super) fn bound_self_overlap<T: TimeNumber>(
     Ok(())
 }
 
-/// Fact that marks the action as running: a condition of its end.
 fn under_way<T: TimeNumber>(task: &Task, own: &Instance<T>) -> Option<Fact> {
     let name = |fact: &Fact| &task.variables[fact.variable.index()].values[fact.value as usize];
     let required = &task.operators[own.end.index()].condition.facts;

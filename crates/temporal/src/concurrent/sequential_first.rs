@@ -144,7 +144,6 @@ pub(super) struct SequentialPlanner<'w> {
     limits: &'w Limits,
     satisficer: Option<Satisficer<'w, Int>>,
     exact: Exact<'w>,
-    /// Number of states that the optimal search may store up to the current turn.
     stored: usize,
     known: Option<Int>,
 }

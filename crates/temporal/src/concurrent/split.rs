@@ -28,7 +28,6 @@ pub(super) enum Half {
     End,
     /// The whole action: instantaneous or of duration 0.
     Whole,
-    /// Timed initial literals with this index in [`Split::events`].
     Timed(usize),
     /// Auxiliary operator that makes every value of a chosen duration reachable in the relaxed
     /// task; no happening.

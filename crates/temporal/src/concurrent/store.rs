@@ -29,7 +29,6 @@ pub(super) struct Origin {
     /// `true` if the same step also applied the end of the started action.
     pub(super) compressed: bool,
     pub(super) together: bool,
-    /// Number of happenings on the path from the root.
     pub(super) depth: u32,
 }
 

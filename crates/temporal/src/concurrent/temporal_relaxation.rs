@@ -39,7 +39,6 @@ pub(super) struct TemporalRelaxation {
     pub(super) over_all: Lists,
     /// Number of conditions of each rule.
     pub(super) unmet: Vec<u32>,
-    /// Rules without entries in `needs`.
     pub(super) free: Vec<u32>,
     pub(super) adds: Lists,
     /// Numeric conditions whose linear expressions each rule may increase, with the amounts. An amount is `None`

@@ -74,7 +74,6 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
     supporters: Vec<Option<(u32, u32)>>,
     is_settled: Vec<bool>,
     unmet: Vec<u32>,
-    /// For each rule: sum of the numbers of relaxed actions of its reached conditions.
     sums: Vec<u32>,
     /// For each rule: its position in the order in which rules fire.
     order: Vec<u32>,
@@ -160,7 +159,6 @@ impl<'a, T: TimeNumber> TimedRelaxation<'a, T> {
         targets.iter().all(is_reached).then(|| self.extract(targets))
     }
 
-    /// Dijkstra's algorithm over propositions, until all targets are settled.
     fn reach(&mut self, TemporalState { state, clocks, .. }: &TemporalState<T>, targets: &[Proposition]) {
         let relaxed = self.relaxed;
         self.values.fill((NEVER, 0));

@@ -32,7 +32,6 @@ impl Affine {
         Some(&self.terms[position].1)
     }
 
-    /// Sum of this expression and `times` times `other`.
     pub(super) fn plus(&self, other: &Self, times: &Rational) -> Self {
         let mut terms = Vec::with_capacity(self.terms.len().saturating_add(other.terms.len()));
         let (mut left_terms, mut right_terms) = (self.terms.iter().peekable(), other.terms.iter().peekable());

@@ -15,8 +15,6 @@ use crate::concurrent::flexible_durations::partial_plan_lp::gap;
 use crate::concurrent::happening::Role;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Computes the lexicographically first sequence of a trace. Memoises the interference relation
-/// between happenings.
 pub(super) struct Traces<'a> {
     concurrent: &'a TemporalTask,
     known: FxHashMap<(OperatorId, OperatorId), bool>,
