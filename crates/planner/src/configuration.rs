@@ -7,9 +7,10 @@
 //! modelled as a budget of 1.
 //!
 //! The algorithm is dynamic programming over the functions with dominance pruning. A partial assignment is pruned
-//! in three cases: another one for these functions has at least its worth and consumes no more of any budget; no
-//! completion respects the budgets; or an upper bound on its completions is less than the best known worth. The
-//! upper bound is a Lagrangian relaxation of the budgets, which is valid for any multipliers
+//! in three cases: another one for these functions has at least its worth and consumes no more of any budget; a
+//! budget does not even suffice for the minimum consumption of the remaining functions; or an upper bound on its
+//! completions is less than the best known worth. The upper bound is a Lagrangian relaxation of the budgets, which
+//! is valid for any multipliers
 //! \[1\]. A subgradient method computes good multipliers in floating-point arithmetic \[2\]. The multipliers are
 //! then rounded, and the bound is evaluated exactly.
 //!
@@ -110,7 +111,6 @@ impl Label {
         label
     }
 
-    /// Returns `true` if `self` consumes no more of any budget than `other`.
     fn is_as_free(&self, other: &Self) -> bool {
         self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
     }
@@ -214,8 +214,8 @@ impl Problem {
         self.functions.iter().fold(self.nothing(), |label, _| label.with(None, None))
     }
 
-    /// Computes multipliers by a subgradient method. Also returns the best assignment found by
-    /// greedy selection along the way. At a limit, the multipliers are valid, but not good.
+    /// Computes multipliers by a subgradient method. Also returns the best assignment found by greedy selection
+    /// along the way. At a limit, the multipliers are valid, but the bounds may be weak.
     #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
     fn prices(&self, limits: &Limits) -> (LagrangeMultipliers, Label) {
         let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
@@ -283,7 +283,8 @@ impl Problem {
         (&label.worth << PRICE_BITS) + paid + prices.after.get(from).cloned().unwrap_or_default()
     }
 
-    /// Prunes partial assignments that cannot reach the worth of `incumbent`.
+    /// Dynamic programming over the functions. Prunes partial assignments that cannot reach the worth of
+    /// `incumbent`. Returns the designs of `incumbent` if no assignment respects the budgets.
     fn search(
         &self,
         prices: &LagrangeMultipliers,
@@ -341,7 +342,6 @@ mod tests {
     /// Number of served functions, number of violated requirements, and utility.
     type Worth = (usize, std::cmp::Reverse<usize>, BigRational);
 
-    /// Returns the first optimal assignment in order of preference, and its quality.
     fn by_enumeration(
         functions: &[Vec<DesignChoice>],
         budgets: &[BigRational],

@@ -94,7 +94,6 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Adds a clause that excludes a plan if `literal` is true.
     fn exclude(&mut self, plan: &[GroundStep], literal: Lit) {
         let mut clause = self.encoding.blocking_clause(plan);
         clause.push(!literal);

@@ -179,9 +179,7 @@ struct Search<'a> {
     cost: Int,
     index: SuccessorGenerator,
     monotone: bool,
-    /// The non-dominated combinations for each operator.
     best: Vec<Choices>,
-    /// All combinations for each operator.
     all: Vec<Choices>,
 }
 
@@ -374,8 +372,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Returns the label of a state that was reached at this cost, or `None` if no cheapest plan
-    /// reaches the state at this cost.
+    /// Returns the label of a state that was reached at this cost, after adding it if it is new. Returns `None`
+    /// if no cheapest plan reaches the state at this cost.
     fn reach(
         &self,
         growth: &mut Growth,

@@ -7,7 +7,6 @@ use task::plan::ground::GroundStep;
 
 use crate::alternatives::graph::{Edge, Graph, ROOT};
 
-/// Maximum number of edges that an enumeration follows.
 const MAX_WORK: usize = 2_000_000;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,8 +50,7 @@ impl<'g> Paths<'g> {
     }
 
     /// Calls `visit` with the steps of each path from the initial label to a goal label, in order of length.
-    /// Stops early if `visit` returns `false` one of the limits or the limit of [`MAX_WORK`] edges is
-    /// reached.
+    /// Stops early if `visit` returns `false`, a limit is reached, or [`MAX_WORK`] edges have been followed.
     pub(super) fn each(&mut self, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         if !self.graph.alive.first().is_some_and(|is_alive| *is_alive) {
             return End::Exhausted;

@@ -78,7 +78,8 @@ fn at_limit(Interrupted: Interrupted) -> NoCertificate {
     NoCertificate::Limit
 }
 
-/// Checks that the certificate can be about this solution of this task.
+/// Returns an error if no certificate is possible for the status of the solution, or for the metric or costs of the
+/// task.
 fn supported<N: TaskNumber>(task: &Task<N>, solution: &Solution) -> Result<(), NoCertificate> {
     if !matches!(solution.status, Status::Optimal | Status::Unsolvable) {
         return Err(NoCertificate::Unproved);
@@ -98,9 +99,9 @@ fn supported<N: TaskNumber>(task: &Task<N>, solution: &Solution) -> Result<(), N
     }
 }
 
-/// Writes the certificate of a solution with the ground cost `cost`. `bounds` computes a heuristic and the scales of its
-/// numbers, and `plain` returns the integer bounds in it. `scales` is used if grounding already proves that the task is
-/// unsolvable.
+/// Writes the certificate of a solution with the ground cost `cost` (`None` for an unsolvable task). `bounds` computes
+/// a heuristic and the scales of its numbers, and `plain` returns the integer bounds in it. `scales` is used if
+/// grounding already proves that the task is unsolvable.
 fn certified<N: TaskNumber, E: Heuristic<N>>(
     context: Context<'_, N>,
     cost: Option<&N>,

@@ -104,8 +104,8 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// Finds a best plan with at most `horizon` steps or, at a limit, the best plan known by then.
-/// `lower` is a lower bound on the cost of all plans.
+/// Finds a best plan with at most `horizon` steps, or the best plan known at a limit. `lower` is a lower bound on
+/// the cost of all plans.
 fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
     let shorter = with_horizon(context.task, horizon);
     let (status, plan, proof) = match explore(Context { task: &shorter, ..context }) {
@@ -201,7 +201,6 @@ fn answer(status: Status, plan: Option<Plan>, proof: Option<Proof>) -> Solution 
     }
 }
 
-/// Replaces the operator costs. The metric becomes the sum of the new costs.
 fn with_costs(
     mut task: Task<Rational>,
     cost: impl Fn(&Operator<Rational>) -> Quantity<Rational>,

@@ -28,9 +28,7 @@ pub(super) struct Run<'a> {
     pub(super) report: &'a mut dyn FnMut(Improvement),
     pub(super) statistics: Statistics,
     started: Instant,
-    /// Cost of the best plan and lower bound, as recorded last.
     noted: Option<(Option<Int>, Int)>,
-    /// Formulas break these symmetries; computed at first use.
     symmetry: OnceCell<Symmetry>,
 }
 
@@ -39,18 +37,16 @@ pub(super) struct Best {
     pub(super) lower: Int,
 }
 
-/// Plans that a formula describes: their maximum cost, and the operators that are allowed at each
-/// step.
+/// Plans that a formula covers: their maximum cost, and the operators that are allowed at each step.
 pub(super) struct FormulaScope {
     pub(super) limit: Int,
     pub(super) allowed: Vec<Vec<bool>>,
-    /// Proved upper bound on the number of steps of all plans within the cost limit, unless the
-    /// formula has fewer steps.
+    /// Proved upper bound on the number of steps of all plans within the cost limit. `None` if no bound is proved
+    /// or the formula has fewer steps.
     pub(super) step_bound: Option<usize>,
 }
 
 impl FormulaScope {
-    /// Number of operator variables, i.e. allowed pairs of a step and an operator.
     pub(super) fn size(&self) -> usize {
         self.allowed.iter().map(|row| row.iter().filter(|flag| **flag).count()).sum()
     }
@@ -87,14 +83,15 @@ impl<'a> Run<'a> {
         Context::new(self.task, &self.config.limits)
     }
 
-    /// Records a contradiction between the results of two components of the planner. Panics in debug builds.
+    /// Records a contradiction between the results of two components of the planner. Panics in debug builds,
+    /// because it is a bug.
     pub(super) fn report_internal_contradiction(&mut self, what: &str) {
         debug_assert!(false, "{what}");
         self.statistics.contradiction = Some(what.to_owned());
     }
 
-    /// Adds the cost of the best plan and the lower bound to the history, unless the change is too
-    /// small.
+    /// Adds the cost of the best plan and the lower bound to the history if the change is large enough (see
+    /// [`REPORT_STEP`]).
     pub(super) fn note(&mut self, cost: Option<Int>, lower: Int) {
         let is_news = self.noted.is_none_or(|(previous, bound)| {
             let rise = lower.saturating_sub(bound);
@@ -242,7 +239,8 @@ impl<'a> Run<'a> {
         cost(self.task, &steps).map(|cost| GroundPlan { steps, cost })
     }
 
-    /// Returns the solution of the run. After an internal contradiction, it counts nothing as proved.
+    /// Returns the solution of the run. After an internal contradiction, the solution claims no proof and no lower
+    /// bound.
     pub(super) fn finish(
         self,
         status: Status,

@@ -6,7 +6,8 @@ const LARGE: usize = 50_000;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SatBudget {
     pub(super) clauses: usize,
-    /// Limit for a formula that is not large.
+    /// Maximum number of conflicts for a formula with fewer than [`LARGE`] clauses; `u64::MAX` for
+    /// no limit.
     pub(super) conflicts: u64,
 }
 

@@ -177,7 +177,6 @@ impl Replanner {
     }
 }
 
-/// Makes every object of a suitable type available.
 fn with_all(domain: &Domain, problem: &Problem, available: &[Name]) -> Problem {
     let hierarchy = TypeHierarchy::of(domain);
     let mut full = problem.clone();

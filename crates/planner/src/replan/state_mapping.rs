@@ -215,7 +215,6 @@ impl Layout {
         Some(next)
     }
 
-    /// Returns the object with this name, regardless of letter case.
     pub(super) fn object(&self, name: &str) -> Option<ObjectId> {
         self.objects.get(&name.to_ascii_lowercase()).copied()
     }
