@@ -125,7 +125,6 @@ struct LagrangeMultipliers {
     after: Vec<BigInt>,
 }
 
-/// Multiplies the numbers by their least common denominator, and returns the denominator, too.
 fn scaled<'a>(numbers: impl Iterator<Item = &'a BigRational> + Clone) -> (Vec<BigInt>, BigInt) {
     let scale = numbers.clone().fold(BigInt::one(), |scale, number| scale.lcm(number.denom()));
     (numbers.map(|number| (number * &scale).to_integer()).collect(), scale)
@@ -339,7 +338,6 @@ mod tests {
         BigRational::from_integer(value.into())
     }
 
-    /// Number of served functions, number of violated requirements, and utility.
     type Worth = (usize, std::cmp::Reverse<usize>, BigRational);
 
     fn by_enumeration(

@@ -65,8 +65,6 @@ pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot:
     }
 }
 
-/// Returns the index of a slot in the task, and the index of the selected design. `position` refers
-/// to the operator of the step.
 fn design(task: &Task, step: &GroundStep, position: usize) -> (usize, u32) {
     let usage = &task.operators[step.operator.index()].slots[position];
     (usage.slot.index(), usage.designs[step.choice[position] as usize])

@@ -100,8 +100,6 @@ impl Run<'_> {
         self.solver.add_clause(&clause);
     }
 
-    /// Solves the formula under assumptions. If it is satisfiable, also returns the decoded plan, unless the plan
-    /// is not executable.
     fn solve(&mut self, assumptions: &[Lit]) -> (Answer, Option<Vec<GroundStep>>) {
         let answer = self.solver.solve(assumptions);
         if answer != Answer::Satisfiable {

@@ -56,7 +56,6 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     Some(result)
 }
 
-/// Finds further cheapest plans as paths of a graph. Returns `None` if graph search is not applicable to the task.
 fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
     let task = context.task;
     // Plans in the incomplete graph. At a limit, the enumeration of the final graph may list fewer.

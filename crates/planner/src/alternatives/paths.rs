@@ -43,7 +43,6 @@ impl<'g> Paths<'g> {
         Self { graph, limits, first, dead: FxHashSet::default(), work: MAX_WORK }
     }
 
-    /// Returns the edges of a label that lead to labels from which a goal can be reached.
     pub(super) fn edges(&self, label: u32) -> impl Iterator<Item = &'g Edge> + use<'_, 'g> {
         let (from, to) = (self.first[label as usize], self.first[(label as usize).saturating_add(1)]);
         self.graph.edges[from..to].iter().filter(|edge| self.graph.alive[edge.to as usize])

@@ -74,7 +74,6 @@ struct Trimmer {
     hints: Vec<Vec<u32>>,
     is_gone: Vec<bool>,
     watches: Vec<Vec<u32>>,
-    /// Indices of the clauses that are not deleted, by their sorted literals.
     positions: FxHashMap<Vec<Literal>, Vec<u32>>,
     is_true: Vec<bool>,
     trail: Vec<Literal>,
@@ -318,7 +317,6 @@ impl Trimmer {
         true
     }
 
-    /// Writes all derived clauses on which the empty clause (the last clause) depends, and their hints.
     #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn write(&self, proof: &mut dyn Write, hints: &mut dyn Write) -> std::io::Result<()> {
         let mut is_needed = vec![false; self.clauses.len()];

@@ -32,7 +32,6 @@ use crate::optimize::{Config, can_repeat_reward};
 use pddl::ast::{Domain, Problem};
 
 const STATE_LIMIT: usize = 2_000_000;
-/// Maximum number of bits of the rounded integer costs from which heuristics are computed.
 const COST_BITS: u64 = 90;
 
 /// A ground task with exact rational numbers.

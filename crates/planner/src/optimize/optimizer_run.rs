@@ -169,7 +169,6 @@ impl<'a> Run<'a> {
         Ok(FormulaScope { limit, allowed, step_bound })
     }
 
-    /// Starts a SAT solver, which stops at a limit or after `budget` conflicts.
     pub(super) fn live(&self, budget: u64) -> IncrementalSolver {
         IncrementalSolver {
             solver: self.config.backend.start(&self.config.limits, budget),

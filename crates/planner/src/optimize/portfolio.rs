@@ -28,7 +28,6 @@ const RELAXATION_WORK_PER_STATE: usize = 200;
 /// Maximum number of clauses of a formula for each state that A\* may store in the same round, before the budget is
 /// halved.
 const CLAUSES_PER_STATE: usize = 50;
-/// Number of stored states that correspond to one conflict of the SAT solver.
 const STATES_PER_CONFLICT: u64 = 4;
 const MAX_BACKOFF: u32 = 3;
 /// Maximum number of times that the budget of a component is doubled.

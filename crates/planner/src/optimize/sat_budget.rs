@@ -12,8 +12,6 @@ pub(super) struct SatBudget {
 }
 
 impl SatBudget {
-    /// Maximum number of conflicts for a formula with `clauses` clauses; fewer for large formulas,
-    /// unless unlimited.
     pub(super) fn conflicts(self, clauses: usize) -> u64 {
         let factor = (clauses / LARGE).saturating_add(1);
         if self.conflicts == u64::MAX {

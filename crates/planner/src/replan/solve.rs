@@ -20,7 +20,6 @@ use crate::replan::query::{FirstStep, Progress, Query, ReplanOutcome};
 use crate::replan::replan_cache::{AvailabilityContext, GroundBase};
 use crate::replan::state_mapping::ReplanState;
 
-/// The initial situation, or the situation after a first step.
 struct Start {
     first: Option<usize>,
     state: State,

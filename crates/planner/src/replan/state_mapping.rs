@@ -42,7 +42,6 @@ pub(super) struct Layout {
 #[derive(Debug, Clone)]
 pub(super) struct ReplanState {
     pub(super) state: State,
-    /// For each availability predicate: the available objects in ascending order.
     pub(super) available: Vec<Vec<ObjectId>>,
 }
 

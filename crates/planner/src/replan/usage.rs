@@ -42,7 +42,6 @@ impl Usage {
         self.changed.contains(name)
     }
 
-    /// Returns `true` if a condition may read the atom with this predicate and [`key`].
     pub(super) fn is_read(&self, predicate: &Name, key: &str) -> bool {
         self.read.contains(predicate) || self.goal.contains(key)
     }

@@ -141,8 +141,6 @@ fn own_start(schema: &Schema) -> Error {
     }
 }
 
-/// Returns the goal condition and adds the rules of all derived atoms in use. Returns `Failure::Undefined` if
-/// the goal is false in all states.
 fn goal(instantiation: &mut Instantiation<'_>) -> Result<GroundCondition, Failure> {
     let Instantiation { world, definitions, timeline } = instantiation;
     let lifted = world.lifted;
