@@ -81,7 +81,7 @@ fn a_metric_without_a_best_value_is_read_with_bounds() {
         "(define (problem p) (:domain d) (:objects a - place)
           (:init (at a) (= (total-cost) 0) (= (reward) 0) (= (fuel) 2)) (:goal (on)) {metric})"
     );
-    // The planner does not detect that burning cannot be repeated forever; waving can.
+    // `burn` cannot be repeated forever, which the planner does not detect. `wave` can be repeated.
     let waving = DOMAIN.replace(
         "(:action flip",
         "(:action wave :parameters () :precondition () :effect (increase (reward) 1)) (:action flip",
