@@ -397,7 +397,6 @@ fn agree(seed: u64, is_locked: bool, thresholds: Thresholds, time: Duration) -> 
     true
 }
 
-/// Requires that at most 5 % of the results are undecided.
 fn are_decided(decided: impl Iterator<Item = bool>) -> Result<(), String> {
     let decided: Vec<bool> = decided.collect();
     let (count, undecided) = (decided.len(), decided.iter().filter(|is_decided| !**is_decided).count());

@@ -16,8 +16,6 @@ const DOMAIN: &str = "(define (domain d)
   (:action flip :parameters () :precondition (not (on)) :effect (on))
   (:action flop :parameters () :precondition (on) :effect (not (on))))";
 
-/// Compares the status, the cost and the number of steps, for every built-in solver and all step
-/// semantics.
 fn check(name: &str, init: &str, goal: &str, metric: &str, expected: (Status, Option<&str>, Option<usize>)) {
     let problem = format!(
         "(define (problem p) (:domain d) (:objects a b c - place)

@@ -94,7 +94,6 @@ struct Labels {
     basic: usize,
 }
 
-/// Result of comparing a state and its path cost with the labels (nodes) at the same [`Place`].
 enum Known {
     /// Another label costs less and is no worse in any compared number.
     Beaten,

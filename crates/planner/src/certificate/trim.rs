@@ -79,7 +79,6 @@ struct Trimmer {
     trail: Vec<Literal>,
     /// Number of literals of the trail that have been propagated.
     done: usize,
-    /// The clause that implies the current value of each variable.
     reasons: Vec<u32>,
     /// The unit clause that permanently fixes the value of each variable.
     units: Vec<u32>,

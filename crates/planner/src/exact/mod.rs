@@ -119,8 +119,6 @@ fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> S
     Solution { lower_bound: Some(metric(context.task, lower)), horizon, ..solution }
 }
 
-/// Solves a task in which actions can improve the metric. Minimises the number of steps, and then the metric
-/// among the plans with this number of steps.
 fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     let nothing = |solution: Solution| Solution { lower_bound: None, ..solution };
     let unknown = || nothing(answer(Status::Unknown, None, None));

@@ -93,7 +93,7 @@ impl HorizonSchedule {
 }
 
 /// Finds a first plan without a budget. Without a plan, returns a solution as an error: a proof that there is no
-/// plan, or the status `Unknown` if a limit is reached or the formulas become too large.
+/// plan (within the horizon), or the status `Unknown` if a limit is reached or the formulas become too large.
 pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
     let mut first = HorizonSchedule::new(run);
     loop {

@@ -227,8 +227,8 @@ impl<'a> Run<'a> {
         (answer, plan)
     }
 
-    /// Checks the steps of a decoded plan, and returns the plan. The formula should admit only plans; this check
-    /// detects errors of the encoding. Returns `None` if the plan is not executable or its cost overflows.
+    /// Returns the plan of decoded steps. The formula should admit only plans; this check detects errors of the
+    /// encoding. Returns `None` if the plan is not executable or its cost overflows.
     fn check(&mut self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
         if pass(self.task, &self.task.initial, &steps).is_none() {
             self.report_internal_contradiction("a formula admits a sequence of actions that is not a plan");

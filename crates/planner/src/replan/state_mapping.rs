@@ -219,7 +219,6 @@ impl Layout {
     }
 }
 
-/// Returns `true` if the state respects the mutex groups on which the operators rely.
 fn respects_exclusion(task: &Task, state: &State) -> bool {
     task.exclusive.iter().all(|group| group.iter().filter(|fact| fact.holds(&state.values)).count() <= 1)
 }

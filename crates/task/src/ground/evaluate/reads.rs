@@ -144,7 +144,6 @@ impl Reads {
         }
     }
 
-    /// Adds each predicate in a condition, with any arguments, and the functions that its comparisons read.
     fn literals(&mut self, formula: &Formula) {
         match formula {
             Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| self.literals(part)),

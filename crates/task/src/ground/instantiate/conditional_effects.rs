@@ -217,8 +217,6 @@ impl Case {
         if admit_some(&forbidden, &sizes, limits)? { Ok(forbidden.into()) } else { Err(Failure::Undefined) }
     }
 
-    /// Returns the operator of this case. Its conditions and effects come from the case, and all other fields from
-    /// `template`. The forbidden combinations of the case are added to those of `template`.
     #[expect(clippy::arithmetic_side_effects, reason = "something was pushed before")]
     pub(super) fn operator(
         self,
