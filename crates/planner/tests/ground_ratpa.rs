@@ -324,9 +324,9 @@ fn mentions(expression: &Expression, name: &str) -> bool {
     }
 }
 
-/// Removes instances without influence on the goal until none is left: their effects are read by no remaining
-/// instance and not by the goal (costs are never negative). Returns the remaining instances, and the facts
-/// that they or the goal read.
+/// Repeatedly removes instances without influence on the goal: instances whose effects neither the goal nor a
+/// remaining instance reads (costs are never negative). Returns the remaining instances, and the facts that
+/// they or the goal read.
 fn relevant<'i>(
     world: &World<'_>,
     mut instances: Vec<&'i Instance>,

@@ -18,7 +18,7 @@ pub struct Alternatives {
     /// `true` if it is proved that every cheapest plan is the first plan or in `plans`, apart from idle actions.
     pub complete: bool,
     /// For each step of the first plan: the choices that every cheapest plan without idle actions makes at this
-    /// step. `None` if they are not determined: for example, a limit was reached, longer cheapest plans may exist,
+    /// step. `None` if they are not determined. Examples: a limit was reached, longer cheapest plans may exist,
     /// the task has waits (steps that only advance the time), or an external solver was used, whose claims are not
     /// verified.
     pub forced: Option<Vec<Forced>>,

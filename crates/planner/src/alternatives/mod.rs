@@ -48,7 +48,7 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     };
     let mut result =
         by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).unwrap_or(unknown);
-    // The evaluations of preferences are no steps of the plan.
+    // Evaluations of preferences are not steps of the plan.
     let actions = first.steps.len().saturating_sub(evaluations(task));
     if let Some(forced) = &mut result.forced {
         forced.truncate(actions);

@@ -87,7 +87,7 @@ fn supported<N: TaskNumber>(task: &Task<N>, solution: &Solution) -> Result<(), N
     if !task.others.is_empty() {
         return Err(NoCertificate::SeveralObjectives);
     }
-    // These fluents are evaluated in the last state.
+    // The final values of these fluents are a part of the metric.
     let fluents = task.objective.rest.iter().map(|(fluent, _)| task.number_names[fluent.0 as usize].as_str());
     let fluents: Vec<&str> = fluents.collect();
     if !fluents.is_empty() {

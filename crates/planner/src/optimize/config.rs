@@ -49,9 +49,9 @@ pub struct Config {
     /// Number of states that A\* stores before satisficing search and SAT solver start. Also scales the work of
     /// each component in the later rounds.
     pub head_start: usize,
-    /// Whether the SAT solver confirms plans that heuristic search proves optimal, where a formula exists, without
-    /// a limit on its work. If `false`, it tries this for small tasks only, with a small budget. A proof that is
-    /// not confirmed remains valid. With [`Engine::Search`], nothing is confirmed.
+    /// If `true`, the SAT solver confirms plans that heuristic search proves optimal, where a formula exists,
+    /// without a limit on its work. If `false`, it tries this for small tasks only, with a small budget. A proof
+    /// that is not confirmed remains valid. With [`Engine::Search`], nothing is confirmed.
     pub confirm: bool,
     /// Step semantics of the SAT formulas. With a horizon, which counts actions, the semantics is always
     /// sequential. The default (`None`) is parallel for a first plan and sequential for the optimality proof.

@@ -41,8 +41,8 @@ impl HorizonSchedule {
         Self { open: Vec::new(), next: Some(0), most: max_horizon, refuted: 0 }
     }
 
-    /// Adds the next horizon unless its formula would be too large, and solves the formulas of all
-    /// undecided horizons, each with the given budget, until one of them yields a plan.
+    /// Adds the next horizon unless its formula would be too large. Then solves the formulas of all undecided
+    /// horizons, each within the budget, until one of them yields a plan.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,

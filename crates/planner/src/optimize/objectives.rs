@@ -247,6 +247,8 @@ fn limit(task: &mut Task, objective: usize, budget: Int) {
         remaining.quantity = cost;
         let mut remaining = remaining.negated();
         remaining.add(&Linear::variable(variable));
+        // With non-negative costs, an exceeded budget stays exceeded, so each step may require that the budget
+        // suffices.
         if always {
             operator.condition.comparisons.push(remaining.clone());
         }

@@ -144,9 +144,9 @@ impl<'a> Run<'a> {
         Some(encoding)
     }
 
-    /// Returns the scope of a formula for plans with a cost of at most `limit`. If these plans have no proved bound
-    /// on their number of steps, the formula has as many steps as the configured horizon or, without a horizon,
-    /// about twice as many as the best plan.
+    /// Returns the scope of a formula for plans with a cost of at most `limit`. The number of steps of the formula
+    /// is the proved step bound, but at most the configured horizon. Without a step bound, the formula has as many
+    /// steps as the horizon or, without a horizon, about twice as many as the best plan.
     pub(super) fn extent(
         &self,
         bounds: &Bounds,

@@ -1,8 +1,8 @@
 //! Proves optimality in stages. The formula of a stage covers the plans whose cost is at most a limit between the
 //! lower bound and the cost of the best plan. The limit rises from stage to stage.
 //!
-//! This requires a step bound. Without one, there is a single formula for all cheaper plans within a number of steps.
-//! It can yield better plans, but proves nothing.
+//! Such a proof requires a step bound. Without a step bound, there is a single formula for all cheaper plans within a
+//! number of steps. This formula can yield better plans, but proves nothing.
 
 use std::time::Instant;
 

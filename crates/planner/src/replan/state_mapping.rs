@@ -1,9 +1,9 @@
 //! Maps problems of a domain to states of a task that was grounded for another problem of the domain.
 //!
-//! The mapping requires that both problems have the same operators. They may differ in availability, in
-//! numbers that actions change, and in facts that actions change and for which the task has variables. These
-//! facts must be reachable in the relaxation of the task and must respect its mutex groups. Then every fact
-//! that is reachable in the new problem is also reachable in the grounded problem. Facts and values that
+//! The mapping requires that both problems have the same operators. The problems may differ in availability,
+//! in numbers that actions change, and in facts that actions change and for which the task has variables.
+//! These facts must be reachable in the relaxation of the task and must respect its mutex groups. Then every
+//! fact that is reachable in the new problem is also reachable in the grounded problem. Facts and values that
 //! actions change but nothing reads may differ arbitrarily. Everything else must be equal: other facts and
 //! values (even if nothing reads them), objects, goal, constraints and metric. The last three are compared as
 //! syntax trees with their positions in the text. Timed initial literals are not supported.

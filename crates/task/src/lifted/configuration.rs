@@ -83,9 +83,9 @@ fn is_separable(lifted: &Lifted, schema: &Schema, parameter: u32) -> bool {
         && !may_enter_axiom(schema, parameter)
 }
 
-/// Returns `true` if a start effect changes a number by a value that depends on the parameter, and a disjunction of the
-/// middle or the condition of an end effect compares this number. Over the state before the start, the comparison
-/// depends on the parameter, and may become the body of an axiom. Axioms have no slots.
+/// Returns `true` if the parameter may reach the body of an axiom, which has no slots. Over the state before the start,
+/// a comparison contains the values that start effects add to the compared number. A comparison in a disjunction of the
+/// middle, or in the condition of an end effect, may become a part of an axiom.
 fn may_enter_axiom(schema: &Schema, parameter: u32) -> bool {
     schema.start_effects.iter().any(|effect| match &effect.change {
         Change::Assign { function, expression, .. } => {
@@ -199,8 +199,8 @@ fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
     }
 }
 
-/// Returns `true` if an over-all or at-end condition of the action, or the condition of an end effect, contains a
-/// derived predicate whose truth value may be changed by start effects of the action or by timed events.
+/// Returns `true` if start effects of the action or timed events may change a derived predicate that the action reads
+/// later: in an over-all or at-end condition, or in the condition of an end effect.
 pub fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
     let (mut open, mut seen, mut numbers) = (Vec::new(), FxHashSet::default(), false);
     let conditions =
