@@ -85,7 +85,6 @@ struct Item {
 
 struct Problem {
     functions: Vec<Vec<Item>>,
-    /// Budgets of the caller, followed by one budget for each component.
     budgets: Vec<BigInt>,
     /// For each function: the minimum consumption of each budget by this and all later functions;
     /// at the end 0.

@@ -18,7 +18,6 @@ pub(super) enum End {
 pub(super) struct Paths<'g> {
     graph: &'g Graph,
     limits: &'g Limits,
-    /// Index of the first edge of each label, followed by the number of edges.
     first: Vec<usize>,
     /// Pairs of a label and a number of steps in which no path leads from the label to a goal.
     dead: FxHashSet<(u32, usize)>,

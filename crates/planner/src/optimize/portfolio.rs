@@ -226,7 +226,6 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         self.exact.is_none() && !self.satisficer.as_ref().is_some_and(can_improve)
     }
 
-    /// Returns `true` if a proof is probably easier to find than a better plan.
     fn is_near(&self) -> bool {
         self.best.as_ref().is_some_and(|plan| {
             plan.cost.saturating_mul(NEAR_OPTIMAL_RATIO.1) <= self.lower.saturating_mul(NEAR_OPTIMAL_RATIO.0)

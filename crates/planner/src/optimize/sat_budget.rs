@@ -23,5 +23,4 @@ impl SatBudget {
     pub(super) const UNLIMITED: Self = Self { clauses: usize::MAX, conflicts: u64::MAX };
 }
 
-/// Maximum number of operator variables of a formula.
 pub(super) const FORMULA_LIMIT: usize = 30_000_000;

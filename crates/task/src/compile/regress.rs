@@ -156,8 +156,6 @@ impl Happening {
         }))
     }
 
-    /// Returns all cases of a case distinction over the effects on the functions. In each case, every function has one
-    /// new value.
     fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, NotRegressable> {
         let mut ways = vec![(super::simplify::truth(), Vec::new())];
         for function in functions {

@@ -414,8 +414,6 @@ impl Addition {
         Self { conditions: Vec::new(), effects: vec![effect] }
     }
 
-    /// Adds the precondition that `what` is false. If an atom `broken` is given, adds an effect instead that
-    /// makes `broken` true if `what` holds.
     pub(super) fn forbid(&mut self, what: Condition, broken: Option<&str>) {
         match broken {
             None => self.conditions.push(not(what)),

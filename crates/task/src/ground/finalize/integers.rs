@@ -13,7 +13,6 @@ use crate::task::number::TaskNumber;
 use crate::task::quantity::Quantity;
 use crate::task::table_map::TableMap;
 
-/// Description of a quantity in overflow errors.
 #[derive(Debug, Clone, Copy)]
 struct Origin {
     what: &'static str,

@@ -194,8 +194,6 @@ fn split<'r>(
 }
 
 impl Case {
-    /// Returns the forbidden combinations of designs of this case, including those of `template`. Returns
-    /// `Failure::Undefined` if no combination remains allowed.
     fn forbidden(
         &self,
         template: &GroundOperator,

@@ -82,7 +82,6 @@ pub fn instantiate<'a>(
     Ok(GroundTask { world, operators, axioms: definitions.axioms, goal, objectives: Vec::new() })
 }
 
-/// Returns the operators of all reached instances. For each schema, only the first error is added to `errors`.
 fn operators(
     instantiation: &mut Instantiation<'_>,
     designs: &[Vec<SlotParameter>],

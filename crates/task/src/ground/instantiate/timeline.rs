@@ -47,7 +47,6 @@ pub(super) struct Timeline {
     pub(super) moment: NumericId,
     pub(super) phases: Vec<AtomId>,
     pub(super) waited: AtomId,
-    /// Time of each event, with the changed atoms and their new truth values.
     pub(super) events: Vec<(Rational, Vec<(AtomId, bool)>)>,
     /// Number of events at or before time 0.
     pub(super) first: usize,
