@@ -7,9 +7,10 @@
 //! modelled as a budget of 1.
 //!
 //! The algorithm is dynamic programming over the functions with dominance pruning. A partial assignment is pruned
-//! in three cases: another one for these functions has at least its worth and consumes no more of any budget; no
-//! completion respects the budgets; or an upper bound on its completions is less than the best known worth. The
-//! upper bound is a Lagrangian relaxation of the budgets, which is valid for any multipliers
+//! in three cases: another one for these functions has at least its worth and consumes no more of any budget; a
+//! budget does not even suffice for the minimum consumption of the remaining functions; or an upper bound on its
+//! completions is less than the best known worth. The upper bound is a Lagrangian relaxation of the budgets, which
+//! is valid for any multipliers
 //! \[1\]. A subgradient method computes good multipliers in floating-point arithmetic \[2\]. The multipliers are
 //! then rounded, and the bound is evaluated exactly.
 //!
@@ -84,7 +85,6 @@ struct Item {
 
 struct Problem {
     functions: Vec<Vec<Item>>,
-    /// Budgets of the caller, followed by one budget for each component.
     budgets: Vec<BigInt>,
     /// For each function: the minimum consumption of each budget by this and all later functions;
     /// at the end 0.
@@ -110,7 +110,6 @@ impl Label {
         label
     }
 
-    /// Returns `true` if `self` consumes no more of any budget than `other`.
     fn is_as_free(&self, other: &Self) -> bool {
         self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
     }
@@ -125,7 +124,6 @@ struct LagrangeMultipliers {
     after: Vec<BigInt>,
 }
 
-/// Multiplies the numbers by their least common denominator, and returns the denominator, too.
 fn scaled<'a>(numbers: impl Iterator<Item = &'a BigRational> + Clone) -> (Vec<BigInt>, BigInt) {
     let scale = numbers.clone().fold(BigInt::one(), |scale, number| scale.lcm(number.denom()));
     (numbers.map(|number| (number * &scale).to_integer()).collect(), scale)
@@ -214,8 +212,8 @@ impl Problem {
         self.functions.iter().fold(self.nothing(), |label, _| label.with(None, None))
     }
 
-    /// Computes multipliers by a subgradient method. Also returns the best assignment found by
-    /// greedy selection along the way. At a limit, the multipliers are valid, but not good.
+    /// Computes multipliers by a subgradient method. Also returns the best assignment found by greedy selection
+    /// along the way. At a limit, the multipliers are valid, but the bounds may be weak.
     #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
     fn prices(&self, limits: &Limits) -> (LagrangeMultipliers, Label) {
         let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
@@ -283,7 +281,8 @@ impl Problem {
         (&label.worth << PRICE_BITS) + paid + prices.after.get(from).cloned().unwrap_or_default()
     }
 
-    /// Prunes partial assignments that cannot reach the worth of `incumbent`.
+    /// Dynamic programming over the functions. Prunes partial assignments that cannot reach the worth of
+    /// `incumbent`. Returns the designs of `incumbent` if no assignment respects the budgets.
     fn search(
         &self,
         prices: &LagrangeMultipliers,
@@ -338,10 +337,8 @@ mod tests {
         BigRational::from_integer(value.into())
     }
 
-    /// Number of served functions, number of violated requirements, and utility.
     type Worth = (usize, std::cmp::Reverse<usize>, BigRational);
 
-    /// Returns the first optimal assignment in order of preference, and its quality.
     fn by_enumeration(
         functions: &[Vec<DesignChoice>],
         budgets: &[BigRational],

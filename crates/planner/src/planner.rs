@@ -140,8 +140,6 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Returns a function that passes each improvement to the callback, and sets the interrupt flag if the callback
-    /// returns `Break`.
     fn hear(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;

@@ -112,7 +112,7 @@ fn required_concurrency() {
     // The light is on in the open interval from 0 to 5, which is too short for three actions of duration 2.
     let goal = "(mended f1) (mended f2) (mended f3)";
     check("three fuses", MATCH, &problem("m1 - match f1 f2 f3 - fuse", goal), (1, 1000), None);
-    // The second fuse cannot be mended either if the hands must rest for half a unit.
+    // A separation of half a unit leaves enough time for two fuses, a separation of two units does not.
     let goal = "(mended f1) (mended f2)";
     let half = ["0: (light m1) [5]", "0: (mend f1) [2]", "2.5: (mend f2) [2]"];
     check("half", MATCH, &problem("m1 - match f1 f2 - fuse", goal), (1, 2), Some(("5", &half)));
@@ -397,7 +397,6 @@ fn agree(seed: u64, is_locked: bool, thresholds: Thresholds, time: Duration) -> 
     true
 }
 
-/// Requires that at most 5 % of the results are undecided.
 fn are_decided(decided: impl Iterator<Item = bool>) -> Result<(), String> {
     let decided: Vec<bool> = decided.collect();
     let (count, undecided) = (decided.len(), decided.iter().filter(|is_decided| !**is_decided).count());

@@ -248,7 +248,6 @@ fn more_than_a_number_is_a_little_more() {
     assert_eq!(solve(&domain, &problem, &rational(1, 1000), &limits).status, Status::Unknown);
 }
 
-/// The planner does not consider durations below the separation and claims nothing about such plans.
 /// The search for chosen durations does not count violated preferences, so they are refused instead of ignored.
 #[test]
 fn preferences_with_durations_in_effects_are_refused() {
@@ -275,6 +274,7 @@ fn preferences_with_durations_in_effects_are_refused() {
     }
 }
 
+/// The planner does not consider durations below the separation. If they are allowed, it claims no optimality.
 #[test]
 fn no_action_is_shorter_than_the_separation() {
     for (bounds, status) in [

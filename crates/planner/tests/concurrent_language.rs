@@ -62,7 +62,7 @@ fn a_duration_is_that_of_the_state_at_the_start() {
     let fill =
         || durative("fill", "(= ?duration (- 10 (fuel)))", "", "(at end (assign (fuel) 10)) (at end (g))");
     check(&fill(), "", "(g)", (Status::Optimal, Some("6")));
-    // It may be cheaper to have more fuel before.
+    // More fuel shortens the filling, so `pour` comes first.
     let pour = durative(
         "pour",
         "(= ?duration 1)",
@@ -103,7 +103,7 @@ fn a_state_dependent_duration_may_have_a_static_divisor() {
     };
     check(&fill("4"), "", "(g)", (Status::Optimal, Some("1.5")));
     check(&fill("0.15"), "", "(g)", (Status::Optimal, Some("40")));
-    // The duration depends on the divisor, but not on the number itself.
+    // More fuel shortens the filling.
     let pour = durative(
         "pour",
         "(= ?duration 1)",

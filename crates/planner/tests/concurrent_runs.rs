@@ -110,8 +110,7 @@ fn a_battery_can_be_charged_by_overlapping_runs() {
 
 #[test]
 fn runs_whose_duration_the_state_decides() {
-    // The second run takes longer, because the number has grown. It may still start while the first run is
-    // active.
+    // A run that starts after `grow` takes longer. Both runs can start before.
     let domain =
         "(define (domain d) (:requirements :durative-actions) (:predicates (go)) (:functions (x) (y))
       (:durative-action react :parameters () :duration (= ?duration (x))

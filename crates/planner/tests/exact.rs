@@ -62,7 +62,6 @@ fn too_large(domain: &Domain, problem: &Problem) -> bool {
     }
 }
 
-/// Maximum number of actions of a random plan.
 const STEPS: usize = 4;
 const NUMBERS: [&str; 2] = ["x", "y"];
 

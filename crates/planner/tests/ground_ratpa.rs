@@ -200,8 +200,6 @@ impl<'d> World<'d> {
         }
     }
 
-    /// Returns `true` if the comparisons can hold within the intervals, and the numeric effects are
-    /// defined.
     fn is_possible(&self, instance: &Instance, numbers: &BTreeMap<Fact, Interval>) -> bool {
         let schema = &self.schemas[instance.schema];
         let value = |expression| self.interval(expression, instance, numbers);
@@ -288,7 +286,6 @@ impl<'d> World<'d> {
         (self.schemas[instance.schema].name.clone(), arguments.collect())
     }
 
-    /// Omits the designs among the arguments.
     fn core(&self, (name, arguments): &(String, Vec<String>)) -> (String, Vec<String>) {
         let schema = self.schemas.iter().find(|schema| schema.name == *name).expect("an action");
         let kept = schema.parameters.iter().zip(arguments);
@@ -327,9 +324,9 @@ fn mentions(expression: &Expression, name: &str) -> bool {
     }
 }
 
-/// Removes instances without influence on the goal until none is left: their effects are read by no remaining
-/// instance and not by the goal (costs are never negative). Returns the remaining instances, and the facts
-/// that they or the goal read.
+/// Repeatedly removes instances without influence on the goal: instances whose effects neither the goal nor a
+/// remaining instance reads (costs are never negative). Returns the remaining instances, and the facts that
+/// they or the goal read.
 fn relevant<'i>(
     world: &World<'_>,
     mut instances: Vec<&'i Instance>,

@@ -19,7 +19,6 @@ fn cpu_time() -> Option<f64> {
     Some(text.split_whitespace().next()?.parse::<f64>().ok()? / 1e9)
 }
 
-/// Executes `work`. Returns its result and its CPU time in seconds.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let before = cpu_time().unwrap_or_default();
     let result = work();

@@ -82,7 +82,7 @@ fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (
     (Some(solution.status), started.elapsed())
 }
 
-/// The task is solvable, so it must never be reported as unsolvable, whatever the time limit is.
+/// The task is solvable, so it must not be reported as unsolvable at any time limit.
 #[test]
 fn wherever_time_is_up_there_is_no_false_answer() {
     let (domain, problem) = depot(4, 2, 3);

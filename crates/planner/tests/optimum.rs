@@ -7,7 +7,7 @@ use testing::missions::Mission;
 use crate::tally::limits;
 use pddl::{Source, read};
 
-/// The SAT solver alone cannot decide missions without a plan or with cost-free cycles.
+/// The SAT solver alone cannot decide missions without a plan, or missions with cycles that cost nothing.
 fn check(seed: u64, (engine, head_start): (Engine, usize), backend: &Backend, strategy: Strategy) {
     let mission = Mission::random(seed);
     let (domain, problem) = (mission.domain(), mission.problem());

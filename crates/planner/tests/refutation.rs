@@ -47,7 +47,6 @@ impl Write for Memory {
     }
 }
 
-/// Formula, legend, proof and hints.
 type Files = [String; 4];
 
 fn refutation(
@@ -71,7 +70,6 @@ fn refutation(
     Ok((steps, files.map(|file| file.text())))
 }
 
-/// Results of checking the formula, the proof and the number of steps.
 fn verdicts(
     certificate: &Certificate,
     claim: &BigRational,

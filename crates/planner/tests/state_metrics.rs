@@ -223,7 +223,6 @@ fn state_dependent_costs_that_are_not_minimised_are_not_called_optimal() {
     });
 }
 
-/// Returns the number of plans found.
 fn check_not_minimised(time: Duration) -> usize {
     let mut planned = 0;
     for seed in 0..30 {

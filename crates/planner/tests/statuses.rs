@@ -16,8 +16,6 @@ const DOMAIN: &str = "(define (domain d)
   (:action flip :parameters () :precondition (not (on)) :effect (on))
   (:action flop :parameters () :precondition (on) :effect (not (on))))";
 
-/// Compares the status, the cost and the number of steps, for every built-in solver and all step
-/// semantics.
 fn check(name: &str, init: &str, goal: &str, metric: &str, expected: (Status, Option<&str>, Option<usize>)) {
     let problem = format!(
         "(define (problem p) (:domain d) (:objects a b c - place)
@@ -81,7 +79,7 @@ fn a_metric_without_a_best_value_is_read_with_bounds() {
         "(define (problem p) (:domain d) (:objects a - place)
           (:init (at a) (= (total-cost) 0) (= (reward) 0) (= (fuel) 2)) (:goal (on)) {metric})"
     );
-    // The planner does not detect that burning cannot be repeated forever; waving can.
+    // `burn` cannot be repeated forever, which the planner does not detect. `wave` can be repeated.
     let waving = DOMAIN.replace(
         "(:action flip",
         "(:action wave :parameters () :precondition () :effect (increase (reward) 1)) (:action flip",

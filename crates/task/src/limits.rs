@@ -66,10 +66,10 @@ impl Limits {
         }
     }
 
-    /// Returns limits for completing an answer after the deadline. The new deadline is later by a tenth of
-    /// the time limit and a constant grace period than the present deadline, or than now if this deadline has passed: it
-    /// takes a while to free the memory of a search. If the limits have no deadline, the new limits have no deadline,
-    /// either. The interrupt flag is new, and the memory limit and thresholds are the defaults.
+    /// Returns limits for completing an answer after the deadline, because freeing the memory of a search takes time.
+    /// The new deadline is the present deadline (or now, if later) plus a tenth of the time limit and a constant grace
+    /// period. Without a deadline, there is no new deadline. The interrupt flag is new; the memory limit and thresholds
+    /// are the defaults.
     #[must_use]
     pub fn extended(&self) -> Self {
         let grace = self.time.mul_f64(0.1).saturating_add(GRACE);

@@ -18,7 +18,7 @@ pub struct Alternatives {
     /// `true` if it is proved that every cheapest plan is the first plan or in `plans`, apart from idle actions.
     pub complete: bool,
     /// For each step of the first plan: the choices that every cheapest plan without idle actions makes at this
-    /// step. `None` if they are not determined: for example, a limit was reached, longer cheapest plans may exist,
+    /// step. `None` if they are not determined. Examples: a limit was reached, longer cheapest plans may exist,
     /// the task has waits (steps that only advance the time), or an external solver was used, whose claims are not
     /// verified.
     pub forced: Option<Vec<Forced>>,
@@ -65,8 +65,6 @@ pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot:
     }
 }
 
-/// Returns the index of a slot in the task, and the index of the selected design. `position` refers
-/// to the operator of the step.
 fn design(task: &Task, step: &GroundStep, position: usize) -> (usize, u32) {
     let usage = &task.operators[step.operator.index()].slots[position];
     (usage.slot.index(), usage.designs[step.choice[position] as usize])

@@ -94,15 +94,12 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Adds a clause that excludes a plan if `literal` is true.
     fn exclude(&mut self, plan: &[GroundStep], literal: Lit) {
         let mut clause = self.encoding.blocking_clause(plan);
         clause.push(!literal);
         self.solver.add_clause(&clause);
     }
 
-    /// Solves the formula under assumptions. If it is satisfiable, also returns the decoded plan, unless the plan
-    /// is not executable.
     fn solve(&mut self, assumptions: &[Lit]) -> (Answer, Option<Vec<GroundStep>>) {
         let answer = self.solver.solve(assumptions);
         if answer != Answer::Satisfiable {

@@ -31,14 +31,12 @@ use task::plan::ground::GroundStep;
 use task::task::number::TaskNumber;
 use task::task::{OperatorId, State, Task};
 
-/// Maximum number of combinations of designs of one operator in the second search.
 const MAX_CHOICES: usize = 20_000;
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Edge {
     pub(super) from: u32,
     pub(super) to: u32,
-    /// Index in [`Graph::steps`].
     pub(super) step: u32,
 }
 
@@ -48,7 +46,6 @@ pub(super) struct Graph {
     /// Edges in ascending order of [`Edge::from`], and then of their steps.
     pub(super) edges: Vec<Edge>,
     pub(super) steps: Vec<GroundStep>,
-    /// For each label (node): whether it satisfies the goal and its cost is that of a cheapest plan.
     pub(super) goals: Vec<bool>,
     /// For each label (node): whether a goal label can be reached from it.
     pub(super) alive: Vec<bool>,
@@ -88,7 +85,6 @@ pub(super) fn cheapest(
 /// numbers that are not compared. Only labels with equal keys are compared with each other.
 type Place = (Box<[u32]>, Box<[Int]>);
 
-/// States, each with the cost of the path by which it was reached.
 struct Labels {
     all: Vec<(State, Int)>,
     places: FxHashMap<Place, Vec<u32>>,
@@ -98,7 +94,6 @@ struct Labels {
     basic: usize,
 }
 
-/// Result of comparing a state and its path cost with the labels (nodes) at the same [`Place`].
 enum Known {
     /// Another label costs less and is no worse in any compared number.
     Beaten,
@@ -179,9 +174,7 @@ struct Search<'a> {
     cost: Int,
     index: SuccessorGenerator,
     monotone: bool,
-    /// The non-dominated combinations for each operator.
     best: Vec<Choices>,
-    /// All combinations for each operator.
     all: Vec<Choices>,
 }
 
@@ -374,8 +367,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Returns the label of a state that was reached at this cost, or `None` if no cheapest plan
-    /// reaches the state at this cost.
+    /// Returns the label of a state that was reached at this cost, after adding it if it is new. Returns `None`
+    /// if no cheapest plan reaches the state at this cost.
     fn reach(
         &self,
         growth: &mut Growth,

@@ -48,7 +48,7 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     };
     let mut result =
         by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).unwrap_or(unknown);
-    // The evaluations of preferences are no steps of the plan.
+    // Evaluations of preferences are not steps of the plan.
     let actions = first.steps.len().saturating_sub(evaluations(task));
     if let Some(forced) = &mut result.forced {
         forced.truncate(actions);
@@ -56,7 +56,6 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     Some(result)
 }
 
-/// Finds further cheapest plans as paths of a graph. Returns `None` if graph search is not applicable to the task.
 fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
     let task = context.task;
     // Plans in the incomplete graph. At a limit, the enumeration of the final graph may list fewer.

@@ -7,7 +7,6 @@ use task::plan::ground::GroundStep;
 
 use crate::alternatives::graph::{Edge, Graph, ROOT};
 
-/// Maximum number of edges that an enumeration follows.
 const MAX_WORK: usize = 2_000_000;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +18,6 @@ pub(super) enum End {
 pub(super) struct Paths<'g> {
     graph: &'g Graph,
     limits: &'g Limits,
-    /// Index of the first edge of each label, followed by the number of edges.
     first: Vec<usize>,
     /// Pairs of a label and a number of steps in which no path leads from the label to a goal.
     dead: FxHashSet<(u32, usize)>,
@@ -44,15 +42,13 @@ impl<'g> Paths<'g> {
         Self { graph, limits, first, dead: FxHashSet::default(), work: MAX_WORK }
     }
 
-    /// Returns the edges of a label that lead to labels from which a goal can be reached.
     pub(super) fn edges(&self, label: u32) -> impl Iterator<Item = &'g Edge> + use<'_, 'g> {
         let (from, to) = (self.first[label as usize], self.first[(label as usize).saturating_add(1)]);
         self.graph.edges[from..to].iter().filter(|edge| self.graph.alive[edge.to as usize])
     }
 
     /// Calls `visit` with the steps of each path from the initial label to a goal label, in order of length.
-    /// Stops early if `visit` returns `false` one of the limits or the limit of [`MAX_WORK`] edges is
-    /// reached.
+    /// Stops early if `visit` returns `false`, a limit is reached, or [`MAX_WORK`] edges have been followed.
     pub(super) fn each(&mut self, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         if !self.graph.alive.first().is_some_and(|is_alive| *is_alive) {
             return End::Exhausted;

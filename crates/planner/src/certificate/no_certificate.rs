@@ -3,7 +3,6 @@
 use ::task::task::{Operator, Task};
 use search::search::{NoLabels, STATE_LIMIT};
 
-/// Maximum number of bits of a common denominator of the numbers of a task.
 pub(super) const MAX_DENOMINATOR_BITS: u64 = 1 << 20;
 
 /// Reason why a solution has no certificate.

@@ -1,8 +1,9 @@
-//! Trims the DRAT proof of a SAT solver to a short proof with hints.
+//! Trims the proof of a SAT solver, in DRAT format, to a short proof with hints.
 //!
-//! Each clause of the solver's proof follows from earlier clauses by unit propagation \[1\]. The clauses used in
-//! this propagation become the hints of the derived clause. Literals that are permanently implied become unit
-//! clauses, which keeps hints short. Only clauses on which the empty clause depends are written.
+//! Each clause of the solver's proof must follow from earlier clauses by unit propagation \[1\]; other RAT
+//! clauses are rejected. The clauses used in this propagation become the hints of the derived clause. Literals
+//! that are permanently implied become unit clauses, which keeps hints short. Only clauses on which the empty
+//! clause depends are written.
 //!
 //! The result is checked again by the crate `certificate`. The checker has its own propagation, which follows the
 //! hints. Both use the same reader and writer of clauses (`certificate::lines`).
@@ -69,18 +70,15 @@ struct Trimmer {
     /// Clauses of the formula, followed by derived clauses. The first two literals of a clause are
     /// watched.
     clauses: Vec<Vec<Literal>>,
-    /// Number of clauses that belong to the formula.
     given: usize,
     hints: Vec<Vec<u32>>,
     is_gone: Vec<bool>,
     watches: Vec<Vec<u32>>,
-    /// Indices of the clauses that are not deleted, by their sorted literals.
     positions: FxHashMap<Vec<Literal>, Vec<u32>>,
     is_true: Vec<bool>,
     trail: Vec<Literal>,
     /// Number of literals of the trail that have been propagated.
     done: usize,
-    /// The clause that implies the current value of each variable.
     reasons: Vec<u32>,
     /// The unit clause that permanently fixes the value of each variable.
     units: Vec<u32>,
@@ -197,8 +195,8 @@ impl Trimmer {
         units.chain([position]).collect()
     }
 
-    /// Adds a clause of the solver's proof with its hints. Ignores a tautology. Fails if the clause
-    /// does not follow.
+    /// Adds a clause of the solver's proof with its hints. Ignores a tautology. Fails if the clause does not
+    /// follow by unit propagation.
     fn conclude(&mut self, clause: &[Literal]) -> Result<(), String> {
         if clause.iter().any(|literal| clause.binary_search(&-*literal).is_ok()) {
             return Ok(());
@@ -274,7 +272,7 @@ impl Trimmer {
         hints
     }
 
-    /// Returns a clause whose literals are all false, if there is one.
+    /// Propagates the new literals of the trail. Returns a clause whose literals are all false, if there is one.
     #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn propagate(&mut self) -> Option<u32> {
         while let Some(literal) = self.trail.get(self.done).copied() {
@@ -318,7 +316,6 @@ impl Trimmer {
         true
     }
 
-    /// Writes all derived clauses on which the empty clause (the last clause) depends, and their hints.
     #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn write(&self, proof: &mut dyn Write, hints: &mut dyn Write) -> std::io::Result<()> {
         let mut is_needed = vec![false; self.clauses.len()];

@@ -78,7 +78,8 @@ fn at_limit(Interrupted: Interrupted) -> NoCertificate {
     NoCertificate::Limit
 }
 
-/// Checks that the certificate can be about this solution of this task.
+/// Returns an error if no certificate is possible for the status of the solution, or for the metric or costs of the
+/// task.
 fn supported<N: TaskNumber>(task: &Task<N>, solution: &Solution) -> Result<(), NoCertificate> {
     if !matches!(solution.status, Status::Optimal | Status::Unsolvable) {
         return Err(NoCertificate::Unproved);
@@ -86,7 +87,7 @@ fn supported<N: TaskNumber>(task: &Task<N>, solution: &Solution) -> Result<(), N
     if !task.others.is_empty() {
         return Err(NoCertificate::SeveralObjectives);
     }
-    // These fluents are evaluated in the last state.
+    // The final values of these fluents are a part of the metric.
     let fluents = task.objective.rest.iter().map(|(fluent, _)| task.number_names[fluent.0 as usize].as_str());
     let fluents: Vec<&str> = fluents.collect();
     if !fluents.is_empty() {
@@ -98,9 +99,9 @@ fn supported<N: TaskNumber>(task: &Task<N>, solution: &Solution) -> Result<(), N
     }
 }
 
-/// Writes the certificate of a solution with the ground cost `cost`. `bounds` computes a heuristic and the scales of its
-/// numbers, and `plain` returns the integer bounds in it. `scales` is used if grounding already proves that the task is
-/// unsolvable.
+/// Writes the certificate of a solution with the ground cost `cost` (`None` for an unsolvable task). `bounds` computes
+/// a heuristic and the scales of its numbers, and `plain` returns the integer bounds in it. `scales` is used if
+/// grounding already proves that the task is unsolvable.
 fn certified<N: TaskNumber, E: Heuristic<N>>(
     context: Context<'_, N>,
     cost: Option<&N>,

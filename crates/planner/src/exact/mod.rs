@@ -32,7 +32,6 @@ use crate::optimize::{Config, can_repeat_reward};
 use pddl::ast::{Domain, Problem};
 
 const STATE_LIMIT: usize = 2_000_000;
-/// Maximum number of bits of the rounded integer costs from which heuristics are computed.
 const COST_BITS: u64 = 90;
 
 /// A ground task with exact rational numbers.
@@ -104,8 +103,8 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// Finds a best plan with at most `horizon` steps or, at a limit, the best plan known by then.
-/// `lower` is a lower bound on the cost of all plans.
+/// Finds a best plan with at most `horizon` steps, or the best plan known at a limit. `lower` is a lower bound on
+/// the cost of all plans.
 fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
     let shorter = with_horizon(context.task, horizon);
     let (status, plan, proof) = match explore(Context { task: &shorter, ..context }) {
@@ -120,8 +119,6 @@ fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> S
     Solution { lower_bound: Some(metric(context.task, lower)), horizon, ..solution }
 }
 
-/// Solves a task in which actions can improve the metric. Minimises the number of steps, and then the metric
-/// among the plans with this number of steps.
 fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     let nothing = |solution: Solution| Solution { lower_bound: None, ..solution };
     let unknown = || nothing(answer(Status::Unknown, None, None));
@@ -201,7 +198,6 @@ fn answer(status: Status, plan: Option<Plan>, proof: Option<Proof>) -> Solution 
     }
 }
 
-/// Replaces the operator costs. The metric becomes the sum of the new costs.
 fn with_costs(
     mut task: Task<Rational>,
     cost: impl Fn(&Operator<Rational>) -> Quantity<Rational>,

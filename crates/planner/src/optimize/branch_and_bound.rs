@@ -1,10 +1,10 @@
 //! Branch and bound for metrics that depend on the state, by A\* with exact costs of paths.
 //!
 //! The portfolio for constant costs finds a first plan. Then a satisficing search for the task with lower bounds as
-//! costs runs in turns with A\*, and its plans are upper bounds. A path dominates another one if it costs no more
-//! and its state has the same facts and no worse numbers. Less of a number is never worse if no condition, cost or
-//! other number needs more of it (and vice versa). With a horizon, longer paths are pruned, and a path dominates
-//! only paths that are at least as long.
+//! costs runs in turns with A\*, and its plans are upper bounds. A path dominates another one if it costs no more and
+//! its state has the same facts and no worse numbers. Less of a number is never worse if no condition, cost or other
+//! number benefits from more of it (and vice versa). With a horizon, longer paths are pruned, and a path dominates only
+//! paths that are at least as long.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -39,13 +39,13 @@ const MAX_COMBINATIONS: usize = 200_000;
 const TURN: usize = 5_000;
 /// Work units of a turn of the satisficing search, for each node of the preceding turn of A\*.
 const WORK: u64 = 1_000;
-/// Approximate memory use of a node in bytes, without its state.
+/// Approximate memory use of a node in bytes, without the numbers and values of its state.
 const OVERHEAD: usize = size_of::<Node>() + 80;
 
-/// Minimises a metric that depends on the state. Returns `None` if the method is not applicable, e.g. with the SAT
-/// solver only, if an operator may improve the metric, or if operators have too many combinations of designs. Also
-/// returns `None` if a limit is reached before the search begins. With a horizon, also returns `None` if no plan
-/// within it was found, unless it is proved that there is no plan at all.
+/// Minimises a metric that depends on the state. Returns `None` if the method is not applicable: for example, with the
+/// SAT solver only, if an operator may improve the metric, or if operators have too many combinations of designs. Also
+/// returns `None` if a limit is reached before the search begins. With a horizon, also returns `None` if no plan within
+/// it was found, unless the search for a first plan proves unsolvability.
 pub(super) fn minimise(
     task: &Task,
     config: &Config,
@@ -109,8 +109,8 @@ pub(super) fn minimise(
     (is_found || horizon.is_none()).then(|| progress.solution(search, end, limits))
 }
 
-/// Searches for a first plan with the portfolio, for the part of the metric that operator costs represent. Returns
-/// `None` if an operator may reduce this part.
+/// Searches with the portfolio until a plan is reported, for the part of the metric that operator costs represent.
+/// Returns `None` if an operator may reduce this part.
 fn first_plan(task: &Task, config: &Config) -> Option<Solution> {
     if task.operators.iter().any(|operator| operator.cost.minimum() < 0) {
         return None;
@@ -140,7 +140,6 @@ struct Progress<'p> {
 }
 
 impl Progress<'_> {
-    /// Reports the best plan if it is better than the one reported last.
     fn note(&mut self, search: &Search<'_>, part: PlannerPart) {
         let Some((total, plan)) = &search.best else { return };
         let cost = search.costs.metric(search.task, *total);
@@ -198,7 +197,7 @@ enum End {
 
 struct Node {
     state: State,
-    /// Sum of the operator costs of the path.
+    /// Sum of the operator costs of the path, in the unit of `total`.
     paid: Int,
     /// Cost of the path, including the weighted values of the measured fluents in its last state.
     total: Int,
@@ -281,7 +280,8 @@ impl<'a> Search<'a> {
         lower.filter(|lower| *lower > Int::MIN)
     }
 
-    /// Expands nodes until the search ends. Returns `None` after `max_nodes` nodes; the search can be resumed.
+    /// Expands nodes until the search ends. Returns `None` after `max_nodes` nodes of the open list; the search can
+    /// then be resumed.
     fn run(&mut self, limits: &Limits, max_nodes: usize, statistics: &mut Statistics) -> Option<End> {
         let _span = info_span!("search").entered();
         let mut pulse = limits.pulse();
@@ -326,7 +326,7 @@ impl<'a> Search<'a> {
         });
         match next {
             Some((next, cost)) => self.add(next, cost, Some((id, step))),
-            // No step reduces the cost.
+            // No step reduces the cost, so the cost of the path is a lower bound.
             None => self.left_out = Some(self.left_out.map_or(total, |bound| bound.min(total))),
         }
     }

@@ -15,8 +15,9 @@ use crate::optimize::unbounded_metric::shortest_then_best;
 /// that a search proves cheapest, and if the SAT solver raises the lower bound. If actions can reduce the cost, the
 /// result is instead a plan with the fewest steps, and the cheapest of these; `report` is then not called.
 ///
-/// Fluents of the metric with state-dependent changes may be unsupported, e.g. if an action may improve the metric.
-/// Then only the remaining part of the metric is minimised, the result has no lower bound, and `report` is not called.
+/// Fluents of the metric with state-dependent changes may be unsupported, e.g. if an action may improve the metric. In
+/// this case, only the remaining part of the metric is minimised, the result has no lower bound, and `report` is not
+/// called.
 ///
 /// ```
 /// use metaplan_planner::{Config, Engine, GroundConfig, Status, ground, optimize};

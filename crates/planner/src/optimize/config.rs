@@ -9,14 +9,14 @@ use task::words;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Strategy {
-    /// The strategy that is usually faster.
+    /// The strategy that is usually faster, at present `Tighten`.
     #[default]
     Auto,
     /// Linear search: finds cheaper and cheaper plans until the formula is unsatisfiable.
     Tighten,
     /// Core-guided search: unsatisfiable cores raise the lower bound until a plan with this cost exists. Without an
-    /// upper bound on the number of steps of a cheapest plan, this strategy equals `Tighten`. The same holds while
-    /// the SAT solver has a budget because it takes turns with other components of the planner.
+    /// upper bound on the number of steps of a cheapest plan, this strategy equals `Tighten`. It also equals
+    /// `Tighten` while the SAT solver has a budget, i.e. takes turns with other components of the planner.
     Cores,
 }
 
@@ -47,11 +47,11 @@ pub struct Config {
     /// Algorithms that find plans and prove optimality.
     pub engine: Engine,
     /// Number of states that A\* stores before satisficing search and SAT solver start. Also scales the work of
-    /// each component in the first round.
+    /// each component in the later rounds.
     pub head_start: usize,
-    /// Whether the SAT solver confirms plans that heuristic search proves optimal, where a formula exists, without
-    /// a limit on its work. If `false`, it tries this for small tasks only, with a small budget. A proof that is
-    /// not confirmed remains valid. With [`Engine::Search`], nothing is confirmed.
+    /// If `true`, the SAT solver confirms plans that heuristic search proves optimal, where a formula exists,
+    /// without a limit on its work. If `false`, it tries this for small tasks only, with a small budget. A proof
+    /// that is not confirmed remains valid. With [`Engine::Search`], nothing is confirmed.
     pub confirm: bool,
     /// Step semantics of the SAT formulas. With a horizon, which counts actions, the semantics is always
     /// sequential. The default (`None`) is parallel for a first plan and sequential for the optimality proof.
@@ -98,8 +98,8 @@ impl Config {
         Self { head_start, ..self }
     }
 
-    /// Sets whether the SAT solver confirms the plans that heuristic search proves optimal, also if this takes
-    /// long; see [`Config::confirm`].
+    /// Sets whether the SAT solver confirms plans that heuristic search proves optimal, without a limit on its
+    /// work; see [`Config::confirm`].
     #[must_use]
     pub fn with_confirmation(self, confirm: bool) -> Self {
         Self { confirm, ..self }

@@ -7,7 +7,7 @@
 //! weight is subtracted from all weights in the core. Plans in which several literals of the core are true cost
 //! more; the outputs of a totalizer represent this and are added one by one as soft literals of the same weight.
 //! Literals with high weight are assumed first (stratification \[3\]), so that plans are found early. A literal
-//! whose weight would raise the lower bound to the cost of the best known plan is fixed to false (hardening \[3\]).
+//! whose weight would raise the lower bound above the cost limit is fixed to false (hardening \[3\]).
 //!
 //! \[1\] B. Andres, B. Kaufmann, O. Matheis, T. Schaub: Unsatisfiability-based optimization in
 //! clasp, ICLP 2012.
@@ -29,7 +29,7 @@ const CORE_TRIM_ROUNDS: usize = 4;
 
 struct Search {
     lower: Int,
-    /// Weight of each soft literal, at least 1. The weight is added to the cost if the literal is true.
+    /// Weight of each soft literal, at least 1. A true literal adds its weight to the cost.
     weights: BTreeMap<Lit, Int>,
     totalizers: Vec<Totalizer>,
     /// Soft literals that are totalizer outputs: the index of the totalizer, and the number n such that the
@@ -51,7 +51,6 @@ impl Search {
         Self { lower, weights, totalizers: Vec::new(), outputs: FxHashMap::default() }
     }
 
-    /// Negations of all soft literals with a weight of at least `least`.
     fn assumptions(&self, least: Int) -> Vec<Lit> {
         self.weights.iter().filter(|(_, weight)| **weight >= least).map(|(literal, _)| !*literal).collect()
     }

@@ -12,12 +12,10 @@ pub(crate) fn evaluations<N>(task: &Task<N>) -> usize {
     task.schema_names.iter().filter(|name| is_satisfaction(name)).count()
 }
 
-/// Returns the configuration with a horizon that includes the evaluations of preferences.
 pub(crate) fn with_evaluations<N>(task: &Task<N>, config: &Config) -> Config {
     config.clone().with_horizon(config.horizon.map(|steps| steps.saturating_add(evaluations(task))))
 }
 
-/// Subtracts the evaluations of preferences from the numbers of steps of a solution.
 pub(crate) fn without_hidden_steps<N>(task: &Task<N>, mut solution: Solution) -> Solution {
     let evaluations = evaluations(task);
     solution.horizon = solution.horizon.saturating_sub(evaluations);

@@ -17,13 +17,11 @@ use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 /// \[1\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and
 /// algorithms for plan search, Artificial Intelligence 170, 2006, section 6.
 pub(super) struct HorizonSchedule {
-    /// Horizons whose formulas are not decided yet.
     open: Vec<usize>,
     next: Option<usize>,
     /// Upper bound on the number of steps of a shortest plan, or the configured horizon if it is smaller.
     /// `usize::MAX` if there is neither.
     most: usize,
-    /// Greatest horizon whose formula was proved unsatisfiable.
     refuted: usize,
 }
 
@@ -43,8 +41,8 @@ impl HorizonSchedule {
         Self { open: Vec::new(), next: Some(0), most: max_horizon, refuted: 0 }
     }
 
-    /// Adds the next horizon unless its formula would be too large, and solves the formulas of all
-    /// undecided horizons, each with the given budget, until one of them yields a plan.
+    /// Adds the next horizon unless its formula would be too large. Then solves the formulas of all undecided
+    /// horizons, each within the budget, until one of them yields a plan.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,
@@ -94,8 +92,8 @@ impl HorizonSchedule {
     }
 }
 
-/// Finds a first plan without a limit on the work. If there is no plan, a time or memory limit is reached,
-/// or the formulas become too large, returns a solution without a plan as an error.
+/// Finds a first plan without a budget. Without a plan, returns a solution as an error: a proof that there is no
+/// plan (within the horizon), or the status `Unknown` if a limit is reached or the formulas become too large.
 pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
     let mut first = HorizonSchedule::new(run);
     loop {

@@ -2,11 +2,11 @@
 //!
 //! By default, heuristic search and a SAT solver take turns; each of them can find plans and prove optimality. Once a
 //! plan is known, the solver receives formulas of the form "a plan with at most B steps and a cost of at most L". B is
-//! a step bound for L: dynamic programming over projections proves that every plan of this cost has at most B steps. L
-//! starts near the lower bound, where formulas are small. An unsatisfiable formula raises the lower bound. A
-//! satisfiable formula is optimised by linear or core-guided search. If there is no step bound, because of cycles
-//! without cost, formulas prove nothing. Optimality then follows only from heuristic search, or from a lower bound that
-//! equals the cost of a plan.
+//! a step bound for L: dynamic programming over projections proves that every plan with a cost of at most L has at most
+//! B steps. L starts near the lower bound, where formulas are small. An unsatisfiable formula raises the lower bound. A
+//! satisfiable formula is optimised by linear or core-guided search. If there is no step bound, for example because of
+//! cycles without cost, formulas prove nothing about optimality. Optimality then follows only from heuristic search, or
+//! from a lower bound that equals the cost of a plan.
 
 mod branch_and_bound;
 mod cheapest;

@@ -23,9 +23,9 @@ use crate::optimize::config::Config;
 /// plan, or the result of a query that did not finish.
 #[derive(Debug, Clone)]
 pub struct Point {
-    /// The solution with its plan. The cost of the plan is its cost under the first objective. Lower bound, proof and
-    /// statistics are those of the search for the first objective, except that an unchecked claim or a contradiction of a
-    /// later search is included.
+    /// The solution with its plan. The cost of the plan is its cost under the first objective. Lower bound and
+    /// statistics are those of the search for the first objective, but an unchecked claim or a contradiction of a later
+    /// search is included. Without a proof for a later objective, there is no proof.
     pub solution: Solution,
     /// Value of the plan under each objective; empty if there is no plan.
     pub values: Vec<Exact>,
@@ -43,10 +43,10 @@ pub struct Front {
     pub status: Status,
 }
 
-/// Finds a lexicographically optimal plan: optimal under the first objective, among these plans optimal under
-/// the second objective, and so on. Also returns its values under all objectives, which are empty if there is
-/// no plan. At a limit, returns the best known plan, if there is one, with the status `Feasible`. There is one search
-/// for each objective; `report` receives its costs and bounds under this objective.
+/// Finds a lexicographically optimal plan: optimal under the first objective, among these plans optimal under the
+/// second objective, and so on. Also returns its values under all objectives, which are empty if there is no plan. At a
+/// limit, returns the best known plan, if there is one, with the status `Feasible`. Each objective has its own search;
+/// `report` receives costs and bounds under the objective of the current search.
 ///
 /// ```
 /// use metaplan_planner::pddl::{ast::Direction, read_objective};
@@ -75,8 +75,8 @@ pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improv
     in_order(task, &order, &[], config, report)
 }
 
-/// Enumerates the Pareto front of the first two objectives until it is complete or a limit is reached. For
-/// each pair of values, only one plan is returned. For each point, `report` is called as by [`lexicographic`].
+/// Enumerates the Pareto front of the first two objectives until it is complete or a limit is reached. For each pair of
+/// values, only one plan is returned. The searches for each point call `report` as [`lexicographic`] does.
 ///
 /// # Panics
 /// The task has fewer than two objectives.
@@ -138,9 +138,9 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
     }
 }
 
-/// Optimises the objectives in the given order. The cost found for each becomes a budget (maximum cost)
-/// for the later ones. Stops at the first objective under which optimality is not proved. `budgets`
-/// gives initial budgets, each as the index of an objective and the maximum cost.
+/// Optimises the objectives in the given order. The cost found for each becomes a budget (maximum cost) for the later
+/// ones. Stops at the first objective under which optimality is not proved. `budgets` are initial budgets: pairs of the
+/// index of an objective and the maximum cost.
 fn in_order(
     task: &Task,
     order: &[usize],
@@ -192,7 +192,6 @@ fn in_order(
     finish(context, best.unwrap_or_else(|| optimize(task, config, report)))
 }
 
-/// Computes the values of the plan under the original objectives of the task.
 fn finish(context: Context<'_>, mut solution: Solution) -> Point {
     let task = context.task;
     let mut values = Vec::new();
@@ -248,6 +247,8 @@ fn limit(task: &mut Task, objective: usize, budget: Int) {
         remaining.quantity = cost;
         let mut remaining = remaining.negated();
         remaining.add(&Linear::variable(variable));
+        // With non-negative costs, an exceeded budget stays exceeded, so each step may require that the budget
+        // suffices.
         if always {
             operator.condition.comparisons.push(remaining.clone());
         }

@@ -28,9 +28,7 @@ pub(super) struct Run<'a> {
     pub(super) report: &'a mut dyn FnMut(Improvement),
     pub(super) statistics: Statistics,
     started: Instant,
-    /// Cost of the best plan and lower bound, as recorded last.
     noted: Option<(Option<Int>, Int)>,
-    /// Formulas break these symmetries; computed at first use.
     symmetry: OnceCell<Symmetry>,
 }
 
@@ -39,18 +37,16 @@ pub(super) struct Best {
     pub(super) lower: Int,
 }
 
-/// Plans that a formula describes: their maximum cost, and the operators that are allowed at each
-/// step.
+/// Plans that a formula covers: their maximum cost, and the operators that are allowed at each step.
 pub(super) struct FormulaScope {
     pub(super) limit: Int,
     pub(super) allowed: Vec<Vec<bool>>,
-    /// Proved upper bound on the number of steps of all plans within the cost limit, unless the
-    /// formula has fewer steps.
+    /// Proved upper bound on the number of steps of all plans within the cost limit. `None` if no bound is proved
+    /// or the formula has fewer steps.
     pub(super) step_bound: Option<usize>,
 }
 
 impl FormulaScope {
-    /// Number of operator variables, i.e. allowed pairs of a step and an operator.
     pub(super) fn size(&self) -> usize {
         self.allowed.iter().map(|row| row.iter().filter(|flag| **flag).count()).sum()
     }
@@ -87,14 +83,15 @@ impl<'a> Run<'a> {
         Context::new(self.task, &self.config.limits)
     }
 
-    /// Records a contradiction between the results of two components of the planner. Panics in debug builds.
+    /// Records a contradiction between the results of two components of the planner. Panics in debug builds,
+    /// because it is a bug.
     pub(super) fn report_internal_contradiction(&mut self, what: &str) {
         debug_assert!(false, "{what}");
         self.statistics.contradiction = Some(what.to_owned());
     }
 
-    /// Adds the cost of the best plan and the lower bound to the history, unless the change is too
-    /// small.
+    /// Adds the cost of the best plan and the lower bound to the history if the change is large enough (see
+    /// [`REPORT_STEP`]).
     pub(super) fn note(&mut self, cost: Option<Int>, lower: Int) {
         let is_news = self.noted.is_none_or(|(previous, bound)| {
             let rise = lower.saturating_sub(bound);
@@ -147,9 +144,9 @@ impl<'a> Run<'a> {
         Some(encoding)
     }
 
-    /// Returns the scope of a formula for plans with a cost of at most `limit`. If these plans have no proved bound
-    /// on their number of steps, the formula has as many steps as the configured horizon or, without a horizon,
-    /// about twice as many as the best plan.
+    /// Returns the scope of a formula for plans with a cost of at most `limit`. The number of steps of the formula
+    /// is the proved step bound, but at most the configured horizon. Without a step bound, the formula has as many
+    /// steps as the horizon or, without a horizon, about twice as many as the best plan.
     pub(super) fn extent(
         &self,
         bounds: &Bounds,
@@ -172,7 +169,6 @@ impl<'a> Run<'a> {
         Ok(FormulaScope { limit, allowed, step_bound })
     }
 
-    /// Starts a SAT solver, which stops at a limit or after `budget` conflicts.
     pub(super) fn live(&self, budget: u64) -> IncrementalSolver {
         IncrementalSolver {
             solver: self.config.backend.start(&self.config.limits, budget),
@@ -231,8 +227,8 @@ impl<'a> Run<'a> {
         (answer, plan)
     }
 
-    /// Checks the steps of a decoded plan, and returns the plan. The formula should admit only plans; this check
-    /// detects errors of the encoding. Returns `None` if the plan is not executable or its cost overflows.
+    /// Returns the plan of decoded steps. The formula should admit only plans; this check detects errors of the
+    /// encoding. Returns `None` if the plan is not executable or its cost overflows.
     fn check(&mut self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
         if pass(self.task, &self.task.initial, &steps).is_none() {
             self.report_internal_contradiction("a formula admits a sequence of actions that is not a plan");
@@ -242,7 +238,8 @@ impl<'a> Run<'a> {
         cost(self.task, &steps).map(|cost| GroundPlan { steps, cost })
     }
 
-    /// Returns the solution of the run. After an internal contradiction, it counts nothing as proved.
+    /// Returns the solution of the run. After an internal contradiction, the solution claims no proof and no lower
+    /// bound.
     pub(super) fn finish(
         self,
         status: Status,

@@ -1,9 +1,9 @@
 //! Portfolio of exact search, satisficing search and SAT, which take turns.
 //!
-//! The work of a round is twice that of the previous round. Each component gets a share of the work; the shares of
-//! satisficing search and SAT shrink while they are unsuccessful. Work is counted in units instead of time, so results
-//! without a time limit are deterministic, except with an external SAT solver: its conflicts are limited by time. The
-//! plans and bounds of a component limit the others.
+//! The work of a round is twice that of the previous round, up to a limit. Each component gets a share of the work;
+//! the shares of satisficing search and SAT shrink while they are unsuccessful. Work is counted in units instead of
+//! time, so results without a time limit are deterministic, except with an external SAT solver: its conflicts are
+//! limited by time. The plans and bounds of a component limit the others.
 
 use std::time::Instant;
 
@@ -25,13 +25,12 @@ use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_b
 
 /// Work units of the satisficing search, for each state that A\* may store in the same round.
 const RELAXATION_WORK_PER_STATE: usize = 200;
-/// Maximum number of clauses of a formula, for each state that A\* may store in the same round.
+/// Maximum number of clauses of a formula for each state that A\* may store in the same round, before the budget is
+/// halved.
 const CLAUSES_PER_STATE: usize = 50;
-/// Number of stored states that correspond to one conflict of the SAT solver.
 const STATES_PER_CONFLICT: u64 = 4;
-/// Maximum number of times that the budget of an unsuccessful component is halved.
 const MAX_BACKOFF: u32 = 3;
-/// Maximum number of times that the budget of a successful component is doubled.
+/// Maximum number of times that the budget of a component is doubled.
 const MAX_BOOST: u32 = 3;
 /// Minimum number of times that the budget for improving the best plan is doubled while a proof is not within
 /// reach.
@@ -54,18 +53,17 @@ struct Portfolio<'r, 'a> {
     prover: Option<Prover>,
     best: Option<GroundPlan>,
     lower: Int,
-    /// Lowest positive operator cost. If the plan costs only this much more than the lower bound, few better plans can
-    /// exist, so that a proof is the likely next result.
+    /// Lowest positive operator cost, or 0. A gap of at most this cost leaves few better plans, so a proof is the
+    /// likely next result.
     least_cost: Int,
-    /// Lower bound at the beginning of each round.
     bounds_by_round: Vec<Int>,
     reason: Proof,
-    /// Number of times that the budget of formulas is halved, at most [`MAX_BACKOFF`].
+    /// Number of times that the clauses and conflicts of formulas are halved, at most [`MAX_BACKOFF`].
     share: u32,
-    /// Number of times that the budget of the satisficing search is halved, at most [`MAX_BACKOFF`].
+    /// Number of unsuccessful turns of the satisficing search since its last plan, at most [`MAX_BACKOFF`].
     satisficer_share: u32,
-    /// The budget for improving the best plan is multiplied by 2 to this power, from
-    /// -[`MAX_BACKOFF`] to [`MAX_BOOST`].
+    /// Binary logarithm of the factor for the budget that improves the best plan, from -[`MAX_BACKOFF`] to
+    /// [`MAX_BOOST`].
     improvement_share: i32,
 }
 
@@ -75,13 +73,12 @@ type Turn = Option<Ending>;
 enum Ending {
     Exact(GroundPlan),
     Unsolvable,
-    /// Proof of a lower bound that equals the cost of the best plan.
     Proved(Proof),
     Refuted(Box<Solution>),
     Over,
 }
 
-/// Returns the best plan known at a limit. `lower` is a lower bound on the cost of every plan.
+/// Runs the portfolio. `lower` is a lower bound on the cost of every plan.
 pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     let started = Instant::now();
     let context = run.context();
@@ -192,9 +189,9 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let span = info_span!("satisfice", expanded = Empty, generated = Empty).entered();
         let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
         let limit = self.best.as_ref().map(|plan| plan.cost);
-        // A first plan is more important than a better plan, and a better plan is more important than a proof,
-        // unless a proof is within reach. Without a plan, or if A* may soon finish, the share of the satisficing
-        // search is halved after each unsuccessful turn, because A* may be faster.
+        // A first plan has priority over a better plan, and a better plan over a proof, unless a proof is within
+        // reach. The budget shrinks after unsuccessful turns if there is no plan, or if a proof is within reach and
+        // A\* may finish: then A\* may be faster.
         let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
         let (twice, halved) = match limit {
             None => (MAX_BOOST.saturating_sub(self.satisficer_share).max(1), 0),
@@ -229,7 +226,6 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         self.exact.is_none() && !self.satisficer.as_ref().is_some_and(can_improve)
     }
 
-    /// Returns `true` if a proof is probably easier to find than a better plan.
     fn is_near(&self) -> bool {
         self.best.as_ref().is_some_and(|plan| {
             plan.cost.saturating_mul(NEAR_OPTIMAL_RATIO.1) <= self.lower.saturating_mul(NEAR_OPTIMAL_RATIO.0)
@@ -238,8 +234,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         })
     }
 
-    /// Replaces parts of the best plan by cheaper ones. After a success, the next turn gets the greatest budget for
-    /// its round; after a failure, half of the current share, but at least a minimum.
+    /// Replaces parts of the best plan by cheaper ones. A success raises the budget of the next turn to its
+    /// maximum; a failure halves it, down to a minimum.
     fn improve_best_plan(&mut self, work: usize, _: usize) -> Turn {
         let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
         let (least, most) = if has_hope && self.is_near() {
@@ -319,7 +315,6 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         }
     }
 
-    /// Makes `plan` the best known plan if it is cheaper.
     fn improve(&mut self, plan: GroundPlan, part: PlannerPart) -> Turn {
         if self.best.as_ref().is_none_or(|best| plan.cost < best.cost) {
             self.run.statistics.found_by = Some(part);
@@ -331,7 +326,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         self.meets()
     }
 
-    /// Ends the run if the cost of the best known plan equals the lower bound.
+    /// Ends the run if the lower bound reaches the cost of the best known plan.
     fn meets(&self) -> Turn {
         let best = self.best.as_ref()?;
         (best.cost <= self.lower).then(|| Ending::Proved(self.reason.clone()))
@@ -373,9 +368,9 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 }
 
-/// Returns `true` if the lower bound `lower` will reach `cost` within [`FORECAST_ROUNDS`] rounds, provided that it
-/// rises as much as in the same number of rounds before. Also returns `true` if there were fewer rounds.
-/// `bounds_by_round` are the bounds at the beginnings of the rounds, including the current one.
+/// Returns `true` if `lower` will reach `cost` within [`FORECAST_ROUNDS`] rounds, by linear extrapolation from as
+/// many previous rounds. Also returns `true` if there were fewer rounds. `bounds_by_round` are the bounds at the
+/// beginnings of the rounds, including the current one.
 fn bound_reaches(bounds_by_round: &[Int], lower: Int, cost: Int) -> bool {
     let earlier = bounds_by_round.iter().rev().nth(FORECAST_ROUNDS);
     earlier.is_none_or(|earlier| lower.saturating_add(lower.saturating_sub(*earlier)) >= cost)

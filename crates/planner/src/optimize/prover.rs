@@ -1,8 +1,8 @@
-//! Proves optimality in stages. Each stage has a formula for the plans whose cost is at most a limit between the lower
-//! bound and the cost of the best plan. The limit rises from stage to stage.
+//! Proves optimality in stages. The formula of a stage covers the plans whose cost is at most a limit between the
+//! lower bound and the cost of the best plan. The limit rises from stage to stage.
 //!
-//! This requires a step bound. Without one, there is a single formula for all cheaper plans within a number of steps.
-//! It can yield better plans, but proves nothing.
+//! Such a proof requires a step bound. Without a step bound, there is a single formula for all cheaper plans within a
+//! number of steps. This formula can yield better plans, but proves nothing.
 
 use std::time::Instant;
 
@@ -24,7 +24,6 @@ const STAGES: Int = 8;
 #[derive(Default)]
 pub(super) struct Prover {
     stage: Option<Int>,
-    /// Greatest number of steps of the formulas that were considered.
     pub(super) horizon: usize,
     /// Step bound of the formula that last raised the lower bound.
     pub(super) step_bound: usize,
@@ -89,8 +88,8 @@ impl Prover {
     }
 }
 
-/// Optimises the cost of plans within the scope of a formula until none is cheaper than `best` or
-/// the budget is used up.
+/// Optimises the cost of plans within the scope of a formula until none is cheaper than `best`, or the budget or a
+/// limit is reached.
 pub(super) fn within(
     run: &mut Run<'_>,
     bounds: &Bounds,

@@ -6,13 +6,12 @@ const LARGE: usize = 50_000;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SatBudget {
     pub(super) clauses: usize,
-    /// Limit for a formula that is not large.
+    /// Maximum number of conflicts for a formula with fewer than [`LARGE`] clauses; `u64::MAX` for
+    /// no limit.
     pub(super) conflicts: u64,
 }
 
 impl SatBudget {
-    /// Maximum number of conflicts for a formula with `clauses` clauses; fewer for large formulas,
-    /// unless unlimited.
     pub(super) fn conflicts(self, clauses: usize) -> u64 {
         let factor = (clauses / LARGE).saturating_add(1);
         if self.conflicts == u64::MAX {
@@ -24,5 +23,4 @@ impl SatBudget {
     pub(super) const UNLIMITED: Self = Self { clauses: usize::MAX, conflicts: u64::MAX };
 }
 
-/// Maximum number of operator variables of a formula.
 pub(super) const FORMULA_LIMIT: usize = 30_000_000;

@@ -22,25 +22,24 @@ const CONFIRM_SIZE: usize = 5_000;
 /// Product of the numbers of operators and steps above which a result of the search is confirmed
 /// only if this is configured.
 const CONFIRM_PRODUCT: usize = 1_500;
-/// Number of operator variables (operators × steps) above which [`confirm`] attempts a confirmation
-/// only if it is configured. Its formula is larger than others, because it does not use the lower
-/// bounds of the search.
+/// Number of operator variables (operators × steps) above which [`confirm`] attempts a confirmation only if it is
+/// configured. Its formula does not use the lower bounds of the search, so it is larger than other formulas.
 const CONFIRM_LIMIT: usize = 400;
 /// Cost limit from which formulas become large, so that confirmation is attempted only if it is configured. Such
 /// costs arise from scaled products of decimals.
 const CONFIRM_COST: Int = 1 << 64;
 
 /// Returns the solution for a plan whose cost equals the lower bound. The SAT solver tries to confirm optimality
-/// if this takes little time or is configured (see [`confirm`]). The proof by the bound counts even if it is not
-/// confirmed.
+/// if this takes little time or is configured (see [`confirm`]). Without confirmation, the proof by the bound
+/// counts.
 pub(super) fn proved_by_bound(mut run: Run<'_>, best: &Best) -> Solution {
     let proof = confirm(&mut run, &best.plan).unwrap_or(Proof::Bound);
     into_solution(run, best, 0, Some(proof))
 }
 
 /// Returns the solution for a plan that an exhausted search has proved optimal. The SAT solver tries to confirm
-/// optimality if the engine includes it and this takes little time or is configured. The proof by search counts
-/// even if it is not confirmed.
+/// optimality if the engine includes it and this takes little time or is configured. Without confirmation, the
+/// proof by search counts.
 pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPlan, lower: Int) -> Solution {
     let mut best = Best { plan, lower };
     run.announce(&best, best.plan.steps.len());

@@ -63,8 +63,6 @@ fn solve_by_formulas(mut run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution 
     }
 }
 
-/// Improves a plan with formulas until it is proved optimal, a limit is reached, or formulas cannot prove
-/// more.
 fn improve(mut run: Run<'_>, bounds: &Bounds, mut best: Best) -> Solution {
     run.announce(&best, best.plan.steps.len());
     if best.plan.cost <= best.lower {

@@ -51,7 +51,6 @@ pub(super) struct StateDependentCosts {
     factor: Int,
     /// Measured fluents with their cost per unit of the stored number.
     weights: Vec<(NumericId, Int)>,
-    /// For each number: whether less or more of it is never worse.
     pub(super) preferences: Vec<Preference>,
     /// The task with constant operator costs, which are lower bounds on the increase of the exact cost.
     pub(super) priced: Task,
@@ -81,7 +80,7 @@ impl StateDependentCosts {
         Ok(Some(Self { factor, weights, preferences, priced }))
     }
 
-    /// Cost of an operator without its effect on measured fluents. `None` on overflow.
+    /// Scaled operator cost, without the effect of the operator on measured fluents. `None` on overflow.
     pub(super) fn paid(&self, operator: &Operator, choice: &[u32]) -> Option<Int> {
         operator.cost_of(choice).checked_mul(self.factor)
     }
@@ -94,7 +93,6 @@ impl StateDependentCosts {
         })
     }
 
-    /// Returns the exact cost of a plan, or `None` if the plan is not executable or a number overflows.
     pub(super) fn total(&self, task: &Task, plan: &GroundPlan) -> Option<Int> {
         let states = pass(task, &task.initial, &plan.steps)?;
         let paid = cost(task, &plan.steps)?.checked_mul(self.factor)?;
@@ -106,8 +104,8 @@ impl StateDependentCosts {
     }
 }
 
-/// Common factor that makes all weights of measured fluents integers, and these weights. `None` on
-/// overflow.
+/// Least common factor that makes the weights of all measured fluents integers, and the products of the weights with
+/// it. `None` on overflow.
 fn weights(task: &Task) -> Option<(Int, Vec<(NumericId, Int)>)> {
     let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
     let measured = &task.objective.rest;
@@ -119,8 +117,8 @@ fn weights(task: &Task) -> Option<(Int, Vec<(NumericId, Int)>)> {
     Some((factor, pairs.collect::<Option<_>>()?))
 }
 
-/// Whether less or more of a number is never worse: every continuation stays possible, and its
-/// steps increase the cost by no more.
+/// Dominance direction of a number: whether less or more of it is never worse. Never worse means that every
+/// continuation stays possible and its steps increase the cost by no more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Preference {
     pub(super) less: bool,
@@ -220,7 +218,7 @@ fn least_increase(
     Some(least)
 }
 
-/// Intervals of the numbers in states in which an operator is applicable.
+/// Intervals of the numbers in reachable states in which an operator is applicable.
 struct Guarded<'i> {
     operator: &'i Operator,
     intervals: &'i [Interval],
@@ -253,8 +251,8 @@ impl<'i> Guarded<'i> {
         restricted.map_or(self.intervals[variable.index()], |(_, interval)| *interval)
     }
 
-    /// Lower bound (if `is_low`) or upper bound on a weighted sum of numbers. `None` if no bound is
-    /// known. A condition on a multiple of the sum also gives a bound.
+    /// Lower bound (if `is_low`) or upper bound on a weighted sum of numbers. `None` if no bound is known. A condition
+    /// also gives a bound if the weighted sum is an integer multiple of the sum that it compares.
     fn extreme(&self, coefficients: &[(NumericId, Int)], is_low: bool) -> Option<Int> {
         let mut sums = coefficients.iter();
         let by_intervals = sums.try_fold(0, |sum: Int, (variable, coefficient)| {
@@ -281,7 +279,7 @@ impl<'i> Guarded<'i> {
     }
 }
 
-/// Integer factor by which `second` must be multiplied to yield `first`, if there is one.
+/// Nonzero integer factor by which `second` must be multiplied to yield `first`, if there is one. Both must be sorted.
 fn multiple(first: &[(NumericId, Int)], second: &[(NumericId, Int)]) -> Option<Int> {
     let ((_, a), (_, b)) = (first.first()?, second.first()?);
     let factor = a.checked_div(*b).filter(|factor| *factor != 0 && first.len() == second.len())?;

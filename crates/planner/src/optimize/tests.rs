@@ -70,7 +70,7 @@ fn every_strategy_finds_the_optimum_of_many() {
 
 /// Checks that the optimum lies between lower bound and cost in every report and in the solution,
 /// and that reports never get worse. Interrupts the run after `stop_after` reports. Returns `true`
-/// if there were as many reports.
+/// if there were at least as many reports.
 fn check_reports(context: &str, (task, best): (&Task, Int), config: &Config, stop_after: usize) -> bool {
     let interrupt = config.limits.interrupt();
     let best = metric(task, &best);

@@ -97,9 +97,8 @@ fn with_costs(task: &Task, cost: impl Fn(&Operator) -> Quantity<Int>) -> Task {
     task
 }
 
-/// Returns `true` if an action that improves the metric is applicable in a state of the plan and
-/// does not change the state. Such an action can be repeated without bound. Also returns `false` if
-/// a limit is reached.
+/// Returns `true` if an action that improves the metric is applicable in a state of the plan and does not
+/// change the state. Such an action can be repeated without bound. At a limit, returns `false`.
 pub fn can_repeat_reward<N: TaskNumber>(context: Context<'_, N>, plan: &[GroundStep]) -> bool {
     let Context { task, limits } = context;
     let Some(states) = pass(task, &task.initial, plan) else { return false };

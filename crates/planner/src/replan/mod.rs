@@ -57,11 +57,11 @@ pub struct Replanner {
 }
 
 impl Replanner {
-    /// Grounds a problem with all objects available. `available` lists the predicates that state
-    /// availability. Returns `None` if replanning does not support the domain or problem. Examples:
-    /// availability is used other than as a condition on action parameters, or only over all by an
-    /// action with the duration 0, there are timed initial literals, preferences or trajectory
-    /// constraints, actions have negative costs, or grounding fails.
+    /// Grounds a problem with all objects available. `available` lists the predicates that state availability.
+    /// Returns `None` if replanning does not support the domain or problem, or if grounding fails. Not supported
+    /// are timed initial literals, preferences, trajectory constraints and negative costs. Availability must be a
+    /// condition on action parameters only. For an action that may have the duration 0, it must not be only a
+    /// condition over all.
     pub fn new(
         domain: &Domain,
         problem: &Problem,
@@ -177,7 +177,6 @@ impl Replanner {
     }
 }
 
-/// Makes every object of a suitable type available.
 fn with_all(domain: &Domain, problem: &Problem, available: &[Name]) -> Problem {
     let hierarchy = TypeHierarchy::of(domain);
     let mut full = problem.clone();

@@ -35,8 +35,8 @@ pub struct Query<'a> {
     /// Current plan: names and arguments of its actions after the first step. If the plan is still valid, its
     /// metric is an upper bound for the search.
     pub old: Option<&'a [(String, Vec<String>)]>,
-    /// Whether, among the best plans with the fewest steps, a plan that keeps as many steps of `old` as
-    /// possible is selected.
+    /// `true` to select, among the best plans with the fewest steps, one that keeps as many steps of `old` as
+    /// possible.
     pub stay_close: bool,
     /// Time and memory limits.
     pub limits: &'a Limits,

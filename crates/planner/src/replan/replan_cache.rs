@@ -12,7 +12,6 @@ use crate::replan::restrict_designs;
 use crate::replan::state_mapping::Layout;
 
 pub(super) struct GroundBase {
-    /// Grounded with all objects available.
     pub(super) task: Task,
     pub(super) layout: Layout,
     /// For each schema: the parameters whose objects must be available, each with the index of an

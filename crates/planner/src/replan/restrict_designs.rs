@@ -172,7 +172,6 @@ fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> b
     (remaining, uses)
 }
 
-/// Returns the entries of a table for the remaining designs, in row-major order.
 #[expect(clippy::arithmetic_side_effects, reason = "a position in the table, which is in memory")]
 fn rows(table: &Table<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Arc<[Int]> {
     let mut positions = vec![0_usize];

@@ -20,7 +20,6 @@ use crate::replan::query::{FirstStep, Progress, Query, ReplanOutcome};
 use crate::replan::replan_cache::{AvailabilityContext, GroundBase};
 use crate::replan::state_mapping::ReplanState;
 
-/// The initial situation, or the situation after a first step.
 struct Start {
     first: Option<usize>,
     state: State,
@@ -116,9 +115,9 @@ pub(super) fn solve(
     ReplanOutcome::Optimal { first, steps: decode(context, &plan).steps, metric }
 }
 
-/// Used if there is no time for a search. Returns `Misfit` if the task cannot represent one of the
-/// first steps. Otherwise returns the current plan after the best first step with which it is still
-/// valid, or `Unknown` if it is valid with no first step.
+/// Fallback without a search. Returns `Misfit` if the task cannot represent one of the first steps. Otherwise
+/// returns the current plan after the best first step with which it is still valid, or `Unknown` if there is
+/// no such step.
 pub(super) fn reuse_previous_plan(
     base: &GroundBase,
     task: &Task,
@@ -135,8 +134,8 @@ pub(super) fn reuse_previous_plan(
     least.map_or(ReplanOutcome::Unknown, |least| least.feasible(Context::new(task, query.limits)))
 }
 
-/// Returns the current plan if it is valid in the given state. `old` holds its steps; a step is
-/// `None` if the task does not contain it.
+/// Returns the current plan if it is valid in the given state. `old` holds its steps; an element is `None` if
+/// the task does not contain the step.
 fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundStep>]) -> Option<GroundPlan> {
     query.old?;
     let steps: Vec<GroundStep> = old.iter().cloned().collect::<Option<_>>()?;

@@ -1,9 +1,9 @@
 //! Maps problems of a domain to states of a task that was grounded for another problem of the domain.
 //!
-//! The mapping requires that both problems have the same operators. They may differ in availability, in
-//! numbers that actions change, and in facts that actions change and for which the task has variables. These
-//! facts must be reachable in the relaxation of the task and must respect its mutex groups. Then every fact
-//! that is reachable in the new problem is also reachable in the grounded problem. Facts and values that
+//! The mapping requires that both problems have the same operators. The problems may differ in availability,
+//! in numbers that actions change, and in facts that actions change and for which the task has variables.
+//! These facts must be reachable in the relaxation of the task and must respect its mutex groups. Then every
+//! fact that is reachable in the new problem is also reachable in the grounded problem. Facts and values that
 //! actions change but nothing reads may differ arbitrarily. Everything else must be equal: other facts and
 //! values (even if nothing reads them), objects, goal, constraints and metric. The last three are compared as
 //! syntax trees with their positions in the text. Timed initial literals are not supported.
@@ -42,7 +42,6 @@ pub(super) struct Layout {
 #[derive(Debug, Clone)]
 pub(super) struct ReplanState {
     pub(super) state: State,
-    /// For each availability predicate: the available objects in ascending order.
     pub(super) available: Vec<Vec<ObjectId>>,
 }
 
@@ -215,13 +214,11 @@ impl Layout {
         Some(next)
     }
 
-    /// Returns the object with this name, regardless of letter case.
     pub(super) fn object(&self, name: &str) -> Option<ObjectId> {
         self.objects.get(&name.to_ascii_lowercase()).copied()
     }
 }
 
-/// Returns `true` if the state respects the mutex groups on which the operators rely.
 fn respects_exclusion(task: &Task, state: &State) -> bool {
     task.exclusive.iter().all(|group| group.iter().filter(|fact| fact.holds(&state.values)).count() <= 1)
 }

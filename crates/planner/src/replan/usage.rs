@@ -17,7 +17,7 @@ pub(super) struct Usage {
     /// Predicates that are read by conditions of actions and effects, by axioms, or by quantified parts of the
     /// goal.
     read: FxHashSet<Name>,
-    /// Keys of the atoms of the goal, see [`key`].
+    /// Keys (see [`key`]) of the atoms that the goal contains outside quantifiers.
     goal: FxHashSet<String>,
     changed: FxHashSet<Name>,
     /// Functions that conditions (including the goal), durations or effects read.
@@ -42,12 +42,10 @@ impl Usage {
         self.changed.contains(name)
     }
 
-    /// Returns `true` if a condition may read the atom with this predicate and [`key`].
     pub(super) fn is_read(&self, predicate: &Name, key: &str) -> bool {
         self.read.contains(predicate) || self.goal.contains(key)
     }
 
-    /// Returns `true` if a condition, duration or effect reads the function. The metric is not considered.
     pub(super) fn is_function_read(&self, function: &Name) -> bool {
         self.functions.contains(function)
     }
@@ -148,7 +146,6 @@ fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     }
 }
 
-/// Counts the occurrences of a predicate in conditions and effects of actions, and in axioms.
 fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     let mut count = Count { predicate, mentions: 0 };
     for action in &domain.actions {

@@ -56,7 +56,6 @@ pub const PLANNED: Features = Features {
 pub struct Draw<'b> {
     bytes: &'b [u8],
     features: Features,
-    /// Static expressions may be undefined.
     partial: bool,
 }
 
@@ -135,7 +134,6 @@ impl<'b> Draw<'b> {
         Formula::Fact(predicate, self.terms(PREDICATES[predicate].1, depth))
     }
 
-    /// Generates an expression. If `is_constant`, it contains only functions that never change.
     fn expression(&mut self, depth: usize, nesting: usize, is_constant: bool, duration: bool) -> Expression {
         let leaf = nesting == 0 || self.chance(50);
         if leaf {

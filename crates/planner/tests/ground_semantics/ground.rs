@@ -50,7 +50,6 @@ fn duration(task: &Task, action: &Action, scope: &[usize], state: &State) -> Opt
     state.value(task, chosen?, scope)
 }
 
-/// Returns the state after an action with the duration that the planner should choose.
 fn after(task: &Task, state: &State, index: usize, objects: Vec<usize>) -> Option<State> {
     let duration = duration(task, &task.actions[index], &objects, state);
     state.after(task, &(index, objects, duration))

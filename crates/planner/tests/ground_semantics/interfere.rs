@@ -94,7 +94,6 @@ impl Touch {
         }
     }
 
-    /// Adds all predicates and functions on which a derived predicate depends.
     fn below(&mut self, task: &Task, predicate: usize) {
         if !self.predicates.insert(predicate) {
             return;

@@ -64,7 +64,6 @@ proptest! {
     }
 }
 
-/// Returns `true` if the task could be grounded.
 fn check_ground(bytes: &[u8]) -> bool {
     let task = Draw::new(bytes, PLANNED).task();
     ground::check(&task, &text::trees(&task)).is_some()

@@ -55,7 +55,6 @@ fn terms(objects: &[usize]) -> Vec<Term> {
     objects.iter().map(|object| Term::Object(*object)).collect()
 }
 
-/// Returns a formula that describes all differences between two states.
 fn difference(before: &State, after: &State) -> Formula {
     let fact = |(predicate, objects): &Atom| Formula::Fact(*predicate, terms(objects));
     let gained = after.facts.difference(&before.facts).map(fact);

@@ -393,7 +393,7 @@ fn unsupported_constructs_are_named() {
     assert_eq!(found, Err(Faithful::Undecided(Cause::Unsupported { construct })));
 }
 
-/// The checker must neither panic nor confuse numbers, whatever numbers a certificate contains.
+/// The checker must neither panic nor confuse numbers for any numbers in a certificate.
 #[test]
 fn hostile_numbers_prove_nothing() {
     let hostile = [i128::MAX, i128::MIN, 1 << 107, -(1 << 107), 1 << 63];

@@ -8,7 +8,6 @@ use serde_json::Value;
 /// Maximum number of states; with more states, the task is not decided.
 const STATE_LIMIT: usize = 2_000;
 
-/// A state: values of the finite-domain variables and of the numeric variables.
 type State = (Vec<i64>, Vec<i64>);
 
 fn list(value: &Value) -> &[Value] {

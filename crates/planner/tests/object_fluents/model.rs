@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-/// Maximum cost of the plans that are enumerated.
 pub(crate) const REACH: u32 = 7;
 
 /// Number of objects 0, 1 and 2. Function g has only the values 0 and 1.

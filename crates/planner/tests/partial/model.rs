@@ -2,7 +2,6 @@
 
 use testing::random::Random;
 
-/// Maximum length of the plans that are enumerated.
 pub(crate) const DEPTH: usize = 5;
 
 /// Truth values of the facts r and s, and values of the numbers a and b.

@@ -3,7 +3,6 @@
 
 use std::fmt::Write as _;
 
-/// Maximum length of the plans that are enumerated.
 const DEPTH: usize = 4;
 
 /// Truth values of p(o0), p(o1), r and s, and value of the number n.

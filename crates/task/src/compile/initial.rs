@@ -30,16 +30,12 @@ fn key(atom: &Atom, binding: &Binding) -> Key {
     (atom.predicate.name.clone(), atom.arguments.iter().map(name).collect())
 }
 
-/// Returns `true` if no argument of the atom is a free variable.
 fn is_bound(atom: &Atom, binding: &Binding) -> bool {
     atom.arguments.iter().all(|argument| matches!(term(argument, binding), Term::Constant(_)))
 }
 
-/// A part of a condition that may have no value.
 enum Undefined<'c> {
-    /// A numeric function without an initial value.
     Function(&'c Name),
-    /// A quotient whose divisor may be 0.
     Quotient,
 }
 
@@ -67,9 +63,8 @@ impl<'t> Initial<'t> {
         self.truth(condition, &mut Vec::new()) == Some(true)
     }
 
-    /// Checks that all numeric functions in a condition have initial values and all divisors are other than 0, and
-    /// returns an error at `place` if not. With an undefined value, both the condition and its negation could be
-    /// false.
+    /// Returns an error at `place` if a numeric function in the condition has no initial value or a divisor may be 0.
+    /// With an undefined value, both the condition and its negation could be false.
     pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         let (construct, instead) = match self.undefined(condition, &mut Vec::new()) {
             None => return Ok(()),
@@ -116,8 +111,8 @@ impl<'t> Initial<'t> {
         })
     }
 
-    /// Returns `false` if a divisor is certainly not 0. Its value in the initial state suffices, because the planner
-    /// refuses divisors that change.
+    /// Returns `false` only if a divisor is certainly not 0. The check of its initial value suffices, because the
+    /// planner rejects divisors that change.
     fn may_be_zero(&self, divisor: &Expression, binding: &Binding) -> bool {
         match divisor {
             // A free variable can have any object as its value.

@@ -75,13 +75,12 @@ pub fn is_satisfaction(action: &str) -> bool {
     is_hidden(action) && action.ends_with(preferences::SATISFACTION)
 }
 
-/// Returns `true` if the name belongs to an auxiliary function, which counts violations of a preference.
 pub(crate) fn is_violation_count(function: &Name) -> bool {
     preferences::is_count(function)
 }
 
-/// Compiles preferences and trajectory constraints away. Preferences that do not occur in `objectives` (if this is
-/// empty: in the metric of the problem) are dropped.
+/// Compiles preferences and trajectory constraints away. Preferences that do not occur in `objectives` are dropped. If
+/// `objectives` is empty, the metric of the problem counts instead.
 ///
 /// # Errors
 /// Returns the unsupported constraints and preferences with their source locations, or an error if a limit is reached

@@ -26,7 +26,6 @@ use super::syntax_edits::{PreferenceInstance, declare, happen, hidden, require};
 const GOING_ON: &str = "the plan goes on";
 
 pub(super) const VIOLATION: &str = " is violated";
-/// End of the names of hidden actions that evaluate a preference of a sequential plan as satisfied.
 pub(super) const SATISFACTION: &str = " is met";
 
 /// Atom that hidden actions add if actions may overlap. It is never true, because these actions are never executed.
@@ -71,8 +70,6 @@ pub(super) fn install(
     }
 }
 
-/// Adds hidden actions that evaluate the preferences in a fixed order. The new goal requires that all preferences are
-/// evaluated.
 fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInstance>) {
     declare(domain, GOING_ON);
     problem.init.push(InitialElement::Fact(flag(GOING_ON)));
@@ -103,8 +100,6 @@ fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInst
     problem.goal = holds(&before);
 }
 
-/// Adds one hidden action for each preference instance. The action is never executed; its precondition is the violation
-/// of the instance.
 fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
     if !wanted.is_empty() {
         declare(domain, VIOLATED);

@@ -144,7 +144,6 @@ impl Happening {
         })
     }
 
-    /// Returns the condition under which an effect selected by `is_kind` applies to the atom.
     fn occurs(&self, atom: &Atom, is_kind: impl Fn(&Effect) -> bool) -> Condition {
         let changes = self.changes.iter().filter(|change| is_kind(&change.effect));
         any(changes.map(|change| {
@@ -157,8 +156,6 @@ impl Happening {
         }))
     }
 
-    /// Returns all cases of a case distinction over the effects on the functions. In each case, every function has one
-    /// new value.
     fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, NotRegressable> {
         let mut ways = vec![(super::simplify::truth(), Vec::new())];
         for function in functions {
@@ -202,7 +199,6 @@ impl Happening {
 }
 
 impl Change {
-    /// Returns the condition under which this change applies, and `target` and `atom` have equal arguments.
     fn hits(&self, target: &Atom, atom: &Atom) -> Condition {
         let matches = target.arguments.iter().zip(&atom.arguments).map(|(changed, own)| equal(changed, own));
         all(self.conditions.iter().cloned().chain(matches))

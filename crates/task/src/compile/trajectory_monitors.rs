@@ -29,7 +29,6 @@ pub(super) struct Monitors<'t> {
     problem: &'t Problem,
     objects: &'t Objects<'t>,
     pub(super) initial: Initial<'t>,
-    /// Additional conditions and effects of each action at its start and at its end.
     additions: Vec<[Addition; 2]>,
     memory: Vec<(String, bool)>,
     goals: Vec<Condition>,
@@ -38,7 +37,7 @@ pub(super) struct Monitors<'t> {
     pub(super) moments: Vec<(String, BigRational)>,
     pub(super) course: PlanSemantics<'t>,
     pub(super) deadlines: Vec<(Deadline, [Condition; 2], Effect)>,
-    /// `true` if an action gets a condition that its duration is positive, because the PDDL files may allow 0.
+    /// `true` if an action gets the precondition that its duration is positive (see [`Monitors::separate`]).
     narrows: bool,
     instances: usize,
     fresh: u64,
@@ -265,7 +264,6 @@ impl<'t> Monitors<'t> {
         !self.narrows && self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
     }
 
-    /// Returns an error if a condition contains a derived predicate or an atom that timed initial literals change.
     pub(super) fn can_be_watched(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         let mut predicates = FxHashSet::default();
         predicates_of(condition, &mut predicates);
@@ -416,8 +414,6 @@ impl Addition {
         Self { conditions: Vec::new(), effects: vec![effect] }
     }
 
-    /// Adds the precondition that `what` is false. If an atom `broken` is given, adds an effect instead that
-    /// makes `broken` true if `what` holds.
     pub(super) fn forbid(&mut self, what: Condition, broken: Option<&str>) {
         match broken {
             None => self.conditions.push(not(what)),

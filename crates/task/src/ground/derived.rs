@@ -1,10 +1,10 @@
 //! Simplifies derived atoms, i.e. atoms of derived predicates and auxiliary atoms that represent
 //! subconditions.
 //!
-//! In general, derived atoms keep their rules \[1\]: their truth values are the least fixpoint of the
-//! stratified rules, given the state variables. Constant derived atoms are replaced by their truth values. A
-//! derived atom with a single rule that is not recursive is replaced by the rule's body where the result is
-//! still a conjunction of literals, clauses and comparisons.
+//! In general, derived atoms keep their rules \[1\]: their truth values are the least fixpoint of the stratified
+//! rules, given the state variables. Constant derived atoms are replaced by their truth values. A derived atom with a
+//! single rule that is not recursive is replaced by the rule's body where the result is still in conjunctive normal
+//! form.
 //!
 //! \[1\] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence
 //! 168, 2005.
@@ -52,8 +52,7 @@ pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     Ok(())
 }
 
-/// Keeps the items for which `keep` returns `true`. Returns an error if the deadline passes or the run is
-/// interrupted; the remaining items are then kept.
+/// Keeps the items for which `keep` returns `true`. At a limit, returns an error and keeps the remaining items.
 fn retain<T>(
     items: &mut Vec<T>,
     limits: &Limits,
@@ -103,7 +102,6 @@ fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), 
     Ok(())
 }
 
-/// Removes literals with known truth values from a conjunction. Returns `false` if one of them is false.
 fn conjunction(literals: &mut Vec<GroundLiteral>, known: &FxHashMap<AtomId, bool>) -> bool {
     let fails =
         literals.iter().any(|(atom, positive)| known.get(atom).is_some_and(|value| value != positive));

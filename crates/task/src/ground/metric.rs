@@ -52,7 +52,7 @@ fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -
     let limits = task.world.limits;
     let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place)?;
     let maximize = metric.direction == Direction::Maximize;
-    // Costs are minimised.
+    // Operator costs are minimised.
     if maximize {
         linear = linear.negated();
         time = -time;
@@ -114,7 +114,6 @@ fn lowers(value: &Linear<Rational>, factor: &Rational) -> bool {
     change.minimum().is_negative()
 }
 
-/// Splits a metric into a linear expression over fluents and the factor of `total-time`.
 fn split(
     world: &mut World<'_>,
     expression: &Expression,

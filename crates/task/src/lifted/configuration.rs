@@ -2,10 +2,10 @@
 //! contains general queries on conditions and expressions, e.g. for their terms.
 //!
 //! In the explicit form (Metaplan paper, Listings 1 and 2), a schema has parameters `?fd` with a condition
-//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable* and becomes a slot if no fluent has it as an argument, and it
-//! does not occur in conditions of effects, in conditions that mix static atoms and fluents, or in products and
-//! quotients with fluents, and if start effects do not change numbers by it that a disjunction or the condition of an
-//! end effect compares. The number of designs then does not multiply the number of ground operators.
+//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable* and becomes a slot under three conditions. No fluent has it
+//! as an argument. It does not occur in conditions of effects, in conditions that mix static atoms and fluents, or in
+//! products and quotients with fluents. No start effect changes a number by it if a disjunction or the condition of an
+//! end effect compares this number. The number of designs then does not multiply the number of ground operators.
 
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -35,8 +35,7 @@ pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> V
             && let [Term::Parameter(parameter), function] = terms[..]
             && function != Term::Parameter(parameter)
             && designs.iter().all(|slot| {
-                // Functions must be fixed before designs are chosen, so no function may itself be a design
-                // parameter.
+                // The function of a slot must be an object of the instance, so it must not be a design parameter.
                 slot.parameter != parameter
                     && Term::Parameter(slot.parameter) != function
                     && slot.function != Term::Parameter(parameter)
@@ -49,8 +48,7 @@ pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> V
     designs
 }
 
-/// Returns the design parameters that are separable and become slots: outside static conditions, they occur
-/// only as arguments of static functions in comparisons, assigned values and the duration.
+/// Returns the design parameters that are separable and become slots (see the head of this file).
 pub fn slot_parameters(lifted: &Lifted, schema: &Schema, designs: &[SlotParameter]) -> Vec<SlotParameter> {
     designs.iter().filter(|design| is_separable(lifted, schema, design.parameter)).copied().collect()
 }
@@ -85,9 +83,9 @@ fn is_separable(lifted: &Lifted, schema: &Schema, parameter: u32) -> bool {
         && !may_enter_axiom(schema, parameter)
 }
 
-/// Returns `true` if a start effect changes a number by a value that depends on the parameter, and a disjunction of the
-/// middle or the condition of an end effect compares this number. Over the state before the start, the comparison
-/// depends on the parameter, and may become the body of an axiom. Axioms have no slots.
+/// Returns `true` if the parameter may reach the body of an axiom, which has no slots. Over the state before the start,
+/// a comparison contains the values that start effects add to the compared number. A comparison in a disjunction of the
+/// middle, or in the condition of an end effect, may become a part of an axiom.
 fn may_enter_axiom(schema: &Schema, parameter: u32) -> bool {
     schema.start_effects.iter().any(|effect| match &effect.change {
         Change::Assign { function, expression, .. } => {
@@ -201,8 +199,8 @@ fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
     }
 }
 
-/// Returns `true` if an over-all or at-end condition of the action, or the condition of an end effect, contains a
-/// derived predicate whose truth value may be changed by start effects of the action or by timed events.
+/// Returns `true` if start effects of the action or timed events may change a derived predicate that the action reads
+/// later: in an over-all or at-end condition, or in the condition of an end effect.
 pub fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
     let (mut open, mut seen, mut numbers) = (Vec::new(), FxHashSet::default(), false);
     let conditions =

@@ -160,7 +160,6 @@ pub(super) fn changing_at_end(domain: &ast::Domain, lifted: &Lifted) -> Vec<Erro
     errors
 }
 
-/// Creates the auxiliary numeric function for the chosen duration of an action.
 fn chosen(names: &mut Names, (action, parameters): (&Name, usize), place: Place) -> Expression {
     let id = FunctionId(dense(names.functions.len()));
     let name = Name::new(&format!("{CHOSEN}{action}"));

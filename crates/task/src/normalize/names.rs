@@ -58,7 +58,7 @@ impl Scope {
 pub(super) struct Names {
     pub(super) objects: Vec<Name>,
     object_ids: FxHashMap<Name, ObjectId>,
-    /// Objects of each type, including subtypes, in ascending order.
+    /// Objects of each type and its subtypes, in ascending order.
     members: FxHashMap<Name, Vec<ObjectId>>,
     pub(super) predicates: Vec<Predicate>,
     predicate_ids: FxHashMap<Name, PredicateId>,

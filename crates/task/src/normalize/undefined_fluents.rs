@@ -32,7 +32,6 @@ pub fn guard(lifted: &mut Lifted) {
     super::fluents::mark_fluents(lifted);
 }
 
-/// Declares the guard predicates and their initial facts.
 fn declare(lifted: &mut Lifted) -> Guards {
     let mut measured = Vec::new();
     for metric in &lifted.metrics {

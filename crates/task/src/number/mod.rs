@@ -18,9 +18,9 @@ use decimal::Decimal;
 
 /// A number of a ground task, scaled to an integer.
 ///
-/// Constants stay below [`LIMIT`] in magnitude. Values that may exceed the type (products with fluents, growing
-/// fluents, sums of costs) are computed by checked operations. `overflow-checks` is enabled for the crates of this
-/// workspace in every profile.
+/// Scaled constants are at most [`LIMIT`] in magnitude. Values that may exceed the type (products with fluents,
+/// growing fluents, sums of costs) are computed by checked operations. `overflow-checks` is enabled for the crates
+/// of this workspace in every profile.
 pub type Int = i128;
 
 /// Limit on the magnitude of scaled constants.

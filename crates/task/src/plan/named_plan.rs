@@ -250,7 +250,7 @@ impl Step {
         }
     }
 
-    /// Adds the functions whose design changes in this step to `reconfigured`. `current` holds the last design
+    /// Appends the functions whose design changes in this step to `reconfigured`. `current` holds the last design
     /// of each function before this step, and is updated.
     fn note_reconfigured(&mut self, current: &mut Vec<(String, String)>) {
         for (function, design) in &self.configuration {

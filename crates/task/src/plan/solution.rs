@@ -17,7 +17,7 @@ pub enum Status {
     Unsolvable,
     /// It is proved that no plan exists within the requested number of steps.
     UnsolvableWithinHorizon,
-    /// No plan was found and nothing was proved, usually because a limit was reached.
+    /// No plan is returned and unsolvability is not proved, usually because a limit was reached.
     Unknown,
 }
 
@@ -160,8 +160,7 @@ pub struct Solution {
     /// Bound on the metric: no plan has a better value. `None` if the metric may be unbounded or no bound is
     /// known.
     pub lower_bound: Option<Exact>,
-    /// Number of steps up to which all plans were considered; for a proof by search, the number of steps of the plan,
-    /// or 0.
+    /// Greatest number of steps of the plans that were considered, or 0 if the planner does not track this number.
     pub horizon: usize,
     /// Justification of the status.
     pub proof: Option<Proof>,

@@ -23,8 +23,8 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
     /// Otherwise, the factor is always 1.
     const SCALED: bool;
 
-    /// Converts `number * scale`. For integers, returns `None` if the result is not an integer or exceeds [`LIMIT`] in
-    /// magnitude.
+    /// Converts `number * scale`. For integers, returns `None` unless the result is an integer from -[`LIMIT`] to
+    /// [`LIMIT`] - 1.
     fn from_rational(number: &Rational, scale: Int) -> Option<Self>;
 
     /// Returns a floating-point approximation, for estimates only.

@@ -257,7 +257,6 @@ impl Exchange {
         Self { objects: (ObjectId(u32::MAX), ObjectId(u32::MAX)), facts: facts.collect() }
     }
 
-    /// Returns the image of an operator, with sorted facts and clauses so that equal operators are identical.
     fn operator(&self, operator: &Operator) -> Operator {
         let mut image = operator.clone();
         for argument in &mut image.arguments {

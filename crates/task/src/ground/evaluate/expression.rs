@@ -11,7 +11,7 @@ use crate::task::quantity::Linear;
 /// slot parameters in the expression.
 ///
 /// # Errors
-/// A value is undefined, or the expression is not linear or not supported.
+/// A value is undefined, the expression is not linear, or a fluent has no initial value.
 pub fn ground(
     world: &mut World<'_>,
     expression: &Expression,
@@ -19,7 +19,7 @@ pub fn ground(
 ) -> Result<Linear<Rational>, Failure> {
     match expression {
         Expression::Number(number) => Ok(Linear::constant(number.clone())),
-        // `total-time` occurs only in metrics, which split it off before they call this function.
+        // `total-time` occurs only in metrics. The `metric` pass removes it before it calls this function.
         Expression::TotalTime => Err(Failure::Undefined),
         Expression::Function(function, terms, place) => {
             let arguments = arguments(terms, binding);

@@ -97,9 +97,7 @@ struct Level {
 }
 
 enum Options {
-    /// The position of a guard (necessary atom), and its remaining rows.
     Rows(usize, std::vec::IntoIter<Arguments>),
-    /// The position of a variable, and the index of its next candidate.
     Candidates(usize, usize),
 }
 

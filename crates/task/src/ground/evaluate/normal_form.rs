@@ -27,7 +27,6 @@ pub struct Definitions {
 }
 
 impl Definitions {
-    /// Returns the CNF of the conjunction of `parts`, or `Failure::Undefined` if it is found to be false.
     pub(crate) fn condition(
         &mut self,
         world: &mut World<'_>,

@@ -130,8 +130,8 @@ impl Reads {
         while let Some(predicate) = open.pop() {
             for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
                 let mut below = Self::default();
-                // How the arguments in the body of an axiom depend on those of its head is not analysed: any
-                // arguments count as read.
+                // The analysis does not relate the arguments of the body to those of the head, so any arguments count
+                // as read.
                 below.literals(&axiom.condition);
                 for (predicate, _) in below.atoms {
                     if seen.insert(predicate) {
@@ -144,7 +144,6 @@ impl Reads {
         }
     }
 
-    /// Adds each predicate in a condition, with any arguments, and the functions that its comparisons read.
     fn literals(&mut self, formula: &Formula) {
         match formula {
             Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| self.literals(part)),

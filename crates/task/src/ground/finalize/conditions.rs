@@ -62,8 +62,8 @@ pub(super) fn contradictory<N>(condition: &Condition<N>) -> bool {
     condition.facts.windows(2).any(|pair| pair[0].variable == pair[1].variable)
 }
 
-/// Sorts the rules of derived variables into layers. Each layer comes after the layers on which it depends.
-/// Rules of atoms that nothing reads are dropped.
+/// Sorts the rules of derived variables into layers. Layers on which a layer depends come first. Rules of
+/// atoms that nothing reads are dropped.
 pub(super) fn axioms<N: TaskNumber>(
     axioms: &[GroundAxiom],
     atoms: &Atoms,

@@ -13,11 +13,9 @@ use crate::task::number::TaskNumber;
 use crate::task::quantity::Quantity;
 use crate::task::table_map::TableMap;
 
-/// The quantity that contains numbers, for the error that a number is too large.
 #[derive(Debug, Clone, Copy)]
 struct Origin {
     what: &'static str,
-    /// Source location of the objective, if the quantity is one.
     place: Option<Place>,
 }
 
@@ -33,7 +31,6 @@ pub(super) struct Denominator {
     /// Least common denominator of the visited numbers; `None` on overflow.
     common: Option<Int>,
     culprit: Option<(String, Option<Place>)>,
-    /// Visited tables by address.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
 
@@ -42,7 +39,7 @@ impl Denominator {
         Self::of(Origin { what, place: None })
     }
 
-    /// Returns the common denominator of the numbers of an objective at `place`, which replaces the metric.
+    /// Creates an empty common denominator for an objective at `place` that replaces the metric.
     pub(super) fn of_objective(place: Place) -> Self {
         Self::of(Origin { what: "the objective", place: Some(place) })
     }

@@ -21,7 +21,6 @@ fn slot_keys(slots: &GroundSlots) -> impl Iterator<Item = (SlotKey, &Vec<ObjectI
     })
 }
 
-/// All slots of a task in the order of their functions, each with all designs that any operator allows for it.
 pub(super) struct Slots {
     pub(super) all: Vec<Slot>,
     ids: FxHashMap<SlotKey, SlotId>,

@@ -49,7 +49,6 @@ impl GroundChange {
     }
 }
 
-/// Returns the added and the deleted atoms. An atom that is both added and deleted counts as added.
 pub(super) fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec<AtomId>, Vec<AtomId>) {
     let (mut adds, mut deletes) = (Vec::new(), Vec::new());
     for change in changes {

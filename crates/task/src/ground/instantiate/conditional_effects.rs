@@ -92,9 +92,9 @@ impl Middle<'_> {
 }
 
 /// Returns the cases of an instance, i.e. the combinations of truth values of its effect conditions. There is at most
-/// one case unless the start effects or numeric effects have conditions. An effect whose condition is false does not
-/// occur (PDDL 2.1, section 8). Contradictory cases, and cases with undefined start effects, are dropped. Fails if
-/// there are more than `CASE_LIMIT` combinations for the start, or for the numeric effects of the end.
+/// one case unless the start effects or numeric effects have conditions. Contradictory cases, and cases with
+/// undefined start effects, are dropped. Fails if there are more than `CASE_LIMIT` combinations for the start, or for
+/// the numeric effects of the end.
 pub(super) fn cases(
     schema: &Schema,
     before: &[Residual],
@@ -121,8 +121,8 @@ pub(super) fn cases(
             .map(|(condition, change)| (after(condition), change.clone()))
             .filter(|(condition, _)| *condition != Residual::False)
             .collect();
-        // A conditional numeric effect would make the cost state-dependent. Each truth value of its condition
-        // therefore becomes a separate case.
+        // Operators have no conditional numeric effects, so each truth value of such a condition becomes a separate
+        // case.
         let numeric = end.iter().filter(|(_, change)| matches!(change, GroundChange::Number { .. }));
         let numeric: Vec<_> = numeric.map(|(condition, _)| condition.clone()).collect();
         for (decided, chosen) in split(schema, numeric.iter())? {
@@ -194,8 +194,6 @@ fn split<'r>(
 }
 
 impl Case {
-    /// Returns the forbidden combinations of designs of this case, including those of `template`. Returns
-    /// `Failure::Undefined` if no combination remains allowed.
     fn forbidden(
         &self,
         template: &GroundOperator,
@@ -217,8 +215,6 @@ impl Case {
         if admit_some(&forbidden, &sizes, limits)? { Ok(forbidden.into()) } else { Err(Failure::Undefined) }
     }
 
-    /// Returns the operator of this case. Its conditions and effects come from the case, and all other fields from
-    /// `template`. The forbidden combinations of the case are added to those of `template`.
     #[expect(clippy::arithmetic_side_effects, reason = "something was pushed before")]
     pub(super) fn operator(
         self,
@@ -236,6 +232,7 @@ impl Case {
         for (condition, change) in self.end.iter().filter(|(condition, _)| *condition != Residual::True) {
             let GroundChange::Atom(atom, positive) = change else { continue };
             let is_deleted = start.deletes.contains(atom) && !start.adds.contains(atom);
+            // The deletion has no effect: the start already deletes the atom, or the end adds the atom.
             if !positive && (is_deleted || end_adds.contains(atom)) {
                 continue;
             }
@@ -269,8 +266,6 @@ impl Case {
     }
 }
 
-/// Returns the conjunction as a list of literals. Conjuncts that are not literals are replaced by auxiliary
-/// atoms.
 fn literals(
     world: &mut World<'_>,
     definitions: &mut Definitions,

@@ -19,7 +19,7 @@ pub(super) fn forbid(forbidden: &mut Vec<ForbiddenCombinations>, slots: &SlotSet
 /// Returns `true` if there is a combination of designs that no constraint forbids. `sizes` is the number of
 /// designs of each slot.
 ///
-/// Backtracking search over the constrained slots only, separately for each connected component of
+/// Uses a backtracking search over the constrained slots only, separately for each connected component of
 /// constraints. A partial combination that violates a constraint is not extended.
 pub(super) fn admit_some(
     forbidden: &[ForbiddenCombinations],

@@ -36,7 +36,6 @@ pub(super) struct SharedInstanceData<'a> {
     pub(super) start: Vec<Residual>,
     pub(super) over_all: Vec<Residual>,
     pub(super) at_end: Vec<Residual>,
-    /// For each start effect, its operand; [`Operand::Closed`] if the effect is not numeric.
     pub(super) start_operands: Vec<Operand>,
     pub(super) end_operands: Vec<Operand>,
     pub(super) duration: Quantity<Rational>,

@@ -135,8 +135,6 @@ fn configuration(
         .collect()
 }
 
-/// Returns the conditions under which the simultaneous start and end of a joint schema (an action with
-/// duration 0) interfere.
 fn joint_clashes(
     build: &mut Build<'_, '_>,
     schema: &Schema,

@@ -82,7 +82,6 @@ pub fn instantiate<'a>(
     Ok(GroundTask { world, operators, axioms: definitions.axioms, goal, objectives: Vec::new() })
 }
 
-/// Returns the operators of all reached instances. For each schema, only the first error is added to `errors`.
 fn operators(
     instantiation: &mut Instantiation<'_>,
     designs: &[Vec<SlotParameter>],
@@ -141,8 +140,6 @@ fn own_start(schema: &Schema) -> Error {
     }
 }
 
-/// Returns the goal condition and adds the rules of all derived atoms in use. Returns `Failure::Undefined` if
-/// the goal is false in all states.
 fn goal(instantiation: &mut Instantiation<'_>) -> Result<GroundCondition, Failure> {
     let Instantiation { world, definitions, timeline } = instantiation;
     let lifted = world.lifted;

@@ -53,8 +53,6 @@ impl SimultaneousEffects {
     }
 }
 
-/// Adds the change of an effect unless its condition is false. The quantified variables of the effect must be
-/// bound.
 fn ground_effect(
     build: &mut Build<'_, '_>,
     effect: &Effect,

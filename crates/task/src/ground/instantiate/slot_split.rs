@@ -23,7 +23,6 @@ pub(super) struct SplitSchema<'a> {
 pub(super) struct Conjuncts<'a> {
     /// Conjuncts that mention no slot, except literals that relaxed reachability has already decided.
     pub(super) closed: Vec<&'a Formula>,
-    /// Conjuncts that mention slots, each with the positions of its slots.
     pub(super) open: Vec<(&'a Formula, SlotSet)>,
 }
 
@@ -43,7 +42,6 @@ impl<'a> Conjuncts<'a> {
     }
 }
 
-/// Returns `true` if relaxed reachability decides the conjunct exactly.
 fn settled(lifted: &Lifted, conjunct: &Formula) -> bool {
     match conjunct {
         Formula::Literal { predicate, .. } => {

@@ -1,12 +1,13 @@
 //! Timed initial literals: events that occur during sequential execution.
 //!
 //! The semantics equals that of `validate`: an action may start at any time, and waiting is free. The events
-//! divide the plan into *phases*: phase i is the time from event i (inclusive) to event i + 1 (exclusive).
-//! The effect of an action depends only on the phases of its start and end, and on whether it ends exactly at
-//! an event. For fixed phases, an earlier start is never worse, because waiting is possible. Each instance
-//! therefore becomes one operator for each *window* (see `timeline_windows`), and the operator starts as
-//! early as possible. A finite-domain variable holds the phase, and a numeric variable holds the clock. A
-//! wait operator advances to the next event.
+//! divide the plan into *phases*: phase i is the time from event i (inclusive) to event i + 1 (exclusive),
+//! where events are counted from 1. Phase 0 is the time before the first event. The effect of an action
+//! depends only on the phases of its start and end, and on whether it ends exactly at an event. For fixed
+//! phases, an earlier start is never worse, because waiting is possible. Each instance therefore becomes one
+//! operator for each *window* (see `timeline_windows`), and the operator starts as early as possible. A
+//! finite-domain variable holds the phase, and a numeric variable holds the clock. A wait operator advances to
+//! the next event.
 //!
 //! If an action must start later than an event, there is no earliest start time. The action then starts one
 //! *moment* after the event. The moment is so short that two distinct times, composed of events and
@@ -15,8 +16,8 @@
 //!
 //! Events change the state at their time. A start or end *interferes* with an event if one of them changes an
 //! atom that the other reads, or both set an atom to different values. An interfering start or end cannot
-//! occur at the time of the event [1, section 8.4; 2, section 2]. Otherwise it can, and the order of the two
-//! is irrelevant. An over-all condition does not include an event at the time of the end.
+//! occur at the time of the event [1, section 8.4; 2, section 2]. Otherwise it can, and the order of happening
+//! and event is irrelevant. An over-all condition does not include an event at the time of the end.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1: an extension to PDDL for expressing temporal planning domains,
 //! JAIR 20, 2003.
@@ -46,7 +47,6 @@ pub(super) struct Timeline {
     pub(super) moment: NumericId,
     pub(super) phases: Vec<AtomId>,
     pub(super) waited: AtomId,
-    /// Time of each event, with the changed atoms and their new truth values.
     pub(super) events: Vec<(Rational, Vec<(AtomId, bool)>)>,
     /// Number of events at or before time 0.
     pub(super) first: usize,
@@ -80,7 +80,7 @@ impl Timeline {
         Some(Self { clock, moment, phases, waited, events, first })
     }
 
-    /// Returns an additional goal: the last step of a plan must not be a wait.
+    /// Additional goal that the last step of a plan is not a wait.
     pub(super) fn at_rest(&self) -> Residual {
         Residual::Literal { atom: self.waited, positive: false }
     }

@@ -18,7 +18,7 @@ use crate::task::timing::Timing;
 pub(super) struct TimelineWindow<'t> {
     timeline: &'t Timeline,
     duration: &'t Quantity<Rational>,
-    /// Phases of the start (`from`) and of the end (`to`): the number of events before or at the start or end.
+    /// Phases of the start (`from`) and of the end (`to`). A phase is the number of events before or at this time.
     from: usize,
     to: usize,
     start: Start,
@@ -49,7 +49,8 @@ enum End {
 }
 
 impl<'t> TimelineWindow<'t> {
-    /// Returns the windows to consider for an action of this duration, each with its interference conditions.
+    /// Returns the windows that are possible for an action of this duration, each with its interference conditions.
+    /// Windows with unconditional interference are omitted.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -141,7 +142,6 @@ impl<'t> TimelineWindow<'t> {
         }
     }
 
-    /// Returns the time one moment after `time`.
     fn later(&self, time: &Rational) -> Linear<Rational> {
         let mut later = Linear::variable(self.timeline.moment);
         later.quantity.constant = time.clone();

@@ -20,8 +20,8 @@ use crate::lifted::configuration::conjuncts;
 use crate::limits::Interrupted;
 
 /// Prunes the task in place. Numbers are not used for pruning if `generality` lets initial numbers vary. Returns the
-/// reason why the goal is unreachable if this is detected, and `None` otherwise. If a reason is returned, pruning is
-/// not complete.
+/// reason why the goal is unreachable if this is detected, and `None` otherwise. With a reason, the task is only
+/// partly pruned.
 pub fn prune(task: &mut GroundTask<'_>, generality: &Generality) -> Result<Option<String>, Interrupted> {
     let world = &task.world;
     let initially: Vec<bool> = world

@@ -26,8 +26,6 @@ pub(super) fn add_axiom(
     Ok(())
 }
 
-/// Adds the rules for an action schema. Returns the relation of its applicable instances, and the parameters
-/// that are its columns.
 pub(super) fn add_schema(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     schema: &Schema,

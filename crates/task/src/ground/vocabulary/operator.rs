@@ -33,8 +33,9 @@ pub struct GroundOperator {
     pub(crate) duration: Quantity<Rational>,
     /// Time of the end if the operator is a wait; `None` if it is an action.
     pub(crate) wait: Option<Rational>,
-    /// Lower bounds on the times of start and end that follow from timed events. If the flag is `true`, the
-    /// bound is one moment (a very short time) later; its length is determined once all durations are known.
+    /// Lower bounds on the times of start and end that follow from timed events. If the flag is `true`, the bound
+    /// is one moment (a very short time) later. The length of the moment is determined once all durations are
+    /// known.
     pub(crate) timing: Timing<(Rational, bool)>,
 }
 

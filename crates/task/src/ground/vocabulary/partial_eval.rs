@@ -57,8 +57,6 @@ impl Residual {
         }
     }
 
-    /// Applies a function to each leaf of the condition, i.e. to everything except `And` and `Or`, and
-    /// simplifies the result.
     pub(crate) fn mapped(self, leaf: &dyn Fn(Self) -> Self) -> Self {
         match self {
             Self::And(parts) => Self::junction(parts.into_iter().map(|part| part.mapped(leaf)), true),

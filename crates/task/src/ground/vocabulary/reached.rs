@@ -9,6 +9,5 @@ pub struct RelaxedReachability {
     /// For each schema: the reachable bindings in ascending order. Slots are unassigned.
     pub(crate) instances: Vec<Vec<Binding>>,
     pub(crate) atoms: AtomSet,
-    /// True atoms of static derived predicates.
     pub(crate) derived: Vec<(PredicateId, Arguments)>,
 }

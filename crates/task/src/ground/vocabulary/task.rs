@@ -33,7 +33,6 @@ pub struct GroundObjective {
 }
 
 impl GroundTask<'_> {
-    /// Returns the atoms that operators, conditional effects or the goal read, directly or through axioms.
     pub(crate) fn read_atoms(&self) -> FxHashSet<AtomId> {
         let conditions = self.operators.iter().map(|operator| &operator.condition).chain(&self.goal);
         let conditional = self.operators.iter().flat_map(|operator| &operator.conditional);

@@ -127,7 +127,6 @@ impl<'a> World<'a> {
         (predicate, arguments)
     }
 
-    /// Returns `true` if an atom belongs to a derived predicate or is auxiliary.
     pub(crate) fn is_derived(&self, atom: AtomId) -> bool {
         let predicate = self.atoms.get_index(atom.index()).map(|((predicate, _), ())| *predicate);
         predicate.is_none_or(|predicate| {
@@ -174,8 +173,6 @@ impl<'a> World<'a> {
         Ok(NumericId(dense(self.numerics.insert_full((function, arguments.into()), ()).0)))
     }
 
-    /// Returns the id of an auxiliary numeric variable for time (the clock or the moment), which is 0
-    /// initially.
     pub(crate) fn clock(&mut self, function: FunctionId) -> NumericId {
         NumericId(dense(self.numerics.insert_full((function, Box::default()), ()).0))
     }
@@ -198,7 +195,6 @@ impl<'a> World<'a> {
         })
     }
 
-    /// Formats a predicate with arguments in PDDL. Auxiliary atoms are formatted as `condition NUMBER`.
     pub(crate) fn name(&self, predicate: PredicateId, arguments: &[ObjectId]) -> String {
         let Some(symbol) = self.lifted.predicates.get(predicate.index()) else {
             let number = arguments.first().map_or(0, |number| number.0);
