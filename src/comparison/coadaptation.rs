@@ -410,7 +410,7 @@ impl Coadaptation {
     }
 }
 
-/// Converts the battery's level or reserve to a number of levels (M122).
+/// Converts a rational number of battery levels to an integer. Returns M122 if the number is out of range.
 fn battery_levels(name: &str, levels: &BigRational) -> Result<u32, Errors> {
     levels.to_integer().to_u32().ok_or_else(|| {
         let text = format!("`{name}` is {levels} battery levels; it must be between 0 and {}", u32::MAX);

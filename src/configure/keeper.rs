@@ -376,7 +376,7 @@ impl Keeper {
         (because, optimal): (Vec<String>, bool),
     ) -> KeeperAnswer {
         self.effects += 1;
-        // A failure of an earlier change must not bring the design before it back.
+        // A failure of an earlier change must not restore an older design.
         for change in self.pending_changes.values_mut().filter(|change| change.objective == objective) {
             change.from = None;
         }

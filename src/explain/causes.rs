@@ -39,8 +39,7 @@ pub struct Availability {
     pub functions: Vec<String>,
     /// `true` if the design is available.
     pub available: bool,
-    /// Rules and facts that rule the design out, and reasons why no plan could use it even if it
-    /// were available.
+    /// Rules and facts that rule the design out, and reasons why some actions could not use the design even if it were available.
     pub because: Vec<String>,
     /// Failed components and measurements that contribute to ruling the design out.
     pub causes: Vec<Cause>,
@@ -55,7 +54,6 @@ pub struct Availability {
 
 /// Sets of alterations that make a design available.
 struct Ways {
-    /// Minimal sets of alterations.
     sets: Vec<Vec<Alteration>>,
     /// Alterations that were not examined, in words.
     unexamined: Vec<String>,
@@ -139,7 +137,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         design: design.individual.name.clone(),
         functions: design.solves.iter().map(|function| function.name.clone()).collect(),
         available: design.available,
-        // Reasons why the design could not be used even if it were available.
+        // Reasons why some actions could not use the design even if it were available.
         because: against(mission, &design.individual.name),
         causes: Vec::new(),
         ways: Vec::new(),

@@ -69,7 +69,6 @@ pub(super) fn rule_bounds(knowledge: &Knowledge) -> RuleBounds {
     RuleBounds { bounds, unexamined: unexamined.iter().map(words).collect() }
 }
 
-/// A rule with its reads of measured values.
 struct RuleReads<'a> {
     rule: &'a Rule,
     reads: &'a [ValueRead],
@@ -297,7 +296,6 @@ impl Reader<'_> {
     }
 }
 
-/// Returns `true` if one of the terms is one of the variables.
 fn contain(variables: &BTreeSet<Variable>, terms: &[Term]) -> bool {
     terms.iter().any(|term| term.as_variable().is_some_and(|variable| variables.contains(&variable)))
 }
@@ -330,7 +328,6 @@ fn is_comparison(built_in: BuiltIn) -> bool {
     )
 }
 
-/// Returns the outcome of a comparison of two values with this order.
 fn holds(built_in: BuiltIn, order: Ordering) -> bool {
     match built_in {
         BuiltIn::LessThan => order.is_lt(),

@@ -28,8 +28,8 @@ use crate::number;
 /// Number of consecutive failures of one step after which the plan is dropped and planning pauses.
 const MAX_FAILURES: u32 = 3;
 
-/// Minimum base of the pauses after searches without a proved outcome. The base is the time limit of a search if that
-/// is longer. The first pause is twice the base, and each further pause is twice the previous one.
+/// Minimum base of the pauses after searches without a proved outcome. The base is the time limit of a search if that is longer. The first pause is
+/// twice the base. Each further pause is twice the previous one, at most [`MAX_RETRY`].
 const MIN_RETRY: Duration = Duration::from_secs(10);
 
 const MAX_RETRY: Duration = Duration::from_secs(3600);
@@ -201,16 +201,15 @@ impl Adaptation<'_> {
         self.beliefs.retry = Some(Retry { at, attempt: attempt + 1 });
     }
 
-    /// Searches for a plan for the reasons `because`, and adopts it unless it is the current plan. With
-    /// [`Need::Better`], the plan is adopted only if its benefit is sufficient. With the other needs, the action under
-    /// way may be cancelled or suspended instead. Decides nothing if a plan is missing and the planner may not search
-    /// for it.
+    /// Searches for a plan for the reasons `because`, and adopts it unless it is the current plan. With [`Need::Better`], the plan is adopted only if
+    /// its benefit is sufficient. With the other needs, the action under way may be cancelled or suspended instead. Decides nothing if a search is
+    /// necessary and the planner may not search.
     pub(super) fn replan(&mut self, because: Vec<String>, need: Need, answers: &mut Vec<Answer>) {
         let is_necessary = need != Need::Better;
         let reason = because.first().cloned().unwrap_or_default();
         answers.push(Answer::PlanRequested { because });
         self.beliefs.improvement_causes.clear();
-        // A search for another reason starts with the initial time limit.
+        // A search before the scheduled time has another reason, and starts with the initial time limit.
         let retry = self.beliefs.retry.take().filter(|scheduled| scheduled.at <= self.beliefs.now);
         let attempt = retry.map_or(0, |scheduled| scheduled.attempt);
         self.planner.attempt = attempt;
@@ -347,8 +346,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns the reason to keep the current plan, or `None` if the benefit of `outcome` is sufficient or the metric
-    /// of the current plan is undefined.
+    /// Returns the reason to keep the current plan. Returns `None` if the benefit of `outcome` is sufficient, or if a metric value cannot be
+    /// computed.
     fn insufficient_benefit(&self, outcome: &Outcome) -> Option<String> {
         let (current_metric, metric) = if self.beliefs.mission.problem().metric.is_some() {
             (self.beliefs.metric()?, outcome.cost.clone())

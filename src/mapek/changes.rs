@@ -25,7 +25,7 @@ pub(super) struct Changes {
     pub(super) interruptions: Vec<String>,
     /// Reasons to plan, as sentences, that apply even if the current plan is valid.
     pub(super) reasons: Vec<String>,
-    /// Answers about filtered reports. The reaction has already returned those of a pending deliberation.
+    /// Answers about filtered reports, until the reaction returns them. A pending deliberation contains none of them.
     #[serde(skip)]
     pub(super) filtered: Vec<Answer>,
 }

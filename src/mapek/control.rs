@@ -99,7 +99,7 @@ pub struct Loop {
     pub(super) monitor: Monitor,
     pub(super) planner: Planner,
     agenda: Option<Agenda>,
-    /// Number of changes of the planning problem since the start, which identifies the current problem.
+    /// Number of reactions that may have changed the planning problem, which identifies the current problem.
     pub(super) question: u64,
     /// Checksum of the initial mission and the settings.
     digest: String,
@@ -407,7 +407,6 @@ impl Loop {
         snapshot
     }
 
-    /// Returns the pending deliberation as JSON, or `null`.
     pub(super) fn agenda_record(&self) -> Value {
         serde_json::to_value(&self.agenda).unwrap_or_default()
     }

@@ -173,7 +173,6 @@ fn status_schema(_: &mut SchemaGenerator) -> Schema {
     })
 }
 
-/// JSON Schema of a decimal number, or a string that contains one.
 fn decimal_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({
         "anyOf": [
@@ -183,7 +182,6 @@ fn decimal_schema(_: &mut SchemaGenerator) -> Schema {
     })
 }
 
-/// JSON Schema of a number from 0 to 1, or a string that contains one.
 fn fraction_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({
         "anyOf": [
@@ -477,7 +475,6 @@ impl Event {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Returns the name of the event in the format, such as `component_status`.
     pub(crate) fn kind(&self) -> String {
         self.to_json().get("event").and_then(Value::as_str).unwrap_or_default().to_owned()
     }

@@ -40,7 +40,6 @@ impl Memo {
         Some(outcome)
     }
 
-    /// Caches an outcome if it is proved.
     pub(super) fn store(&mut self, question: &Question<'_>, outcome: &Outcome) {
         if outcome.proved {
             self.0.push_front((StoredQuestion::new(question), outcome.clone()));

@@ -63,9 +63,8 @@ impl Planner {
         outcome
     }
 
-    /// Removes and returns the next outcome computed by another thread. Returns `None` if there is none, or if the
-    /// outcome is about a different action under way. If the situation has changed, for example by progress of the
-    /// action, the outcome no longer counts as proved.
+    /// Removes and returns the next outcome computed by another thread. Returns `None` without a next outcome, or if the outcome is about a different
+    /// action under way. If the situation has changed, for example by progress of the action, the outcome no longer counts as proved.
     fn prepared(&mut self, question: &Question<'_>) -> Option<Outcome> {
         let (answered, mut outcome) = self.prepared.pop_front()?;
         if !answered.has_same_action(question) {

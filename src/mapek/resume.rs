@@ -225,10 +225,8 @@ pub(super) fn has_reached_facts(domain: &Domain, step: &PlannedStep, problem: &P
     schemas(domain, step).any(|schema| reached_facts(schema, step, problem).is_some())
 }
 
-/// A ground atom.
 type GroundFact = (Name, Vec<Name>);
 
-/// Returns the atom with the arguments of a step.
 fn ground(atom: &Atom, schema: &Action, step: &PlannedStep) -> GroundFact {
     let value = |term: &Term| match term {
         Term::Variable(variable) => {
@@ -316,7 +314,6 @@ fn waive(condition: &mut Condition, is_changed: &impl Fn(&Atom) -> bool) {
     }
 }
 
-/// Parameters of the compilation of a schema to its remainder.
 struct Shortening<'a> {
     progress: &'a BigRational,
     remaining_share: BigRational,
@@ -326,8 +323,7 @@ struct Shortening<'a> {
     gradual: &'a BTreeSet<Name>,
     /// Functions with companions.
     restored: &'a BTreeSet<Name>,
-    /// Changed values, each with its change by the whole action minus the change, extrapolated to the whole action, that
-    /// the progress has made.
+    /// Changed values, each with the difference between its changes by the whole action: with the open designs, minus with the past designs.
     differences: Vec<(Atom, Expression)>,
 }
 
@@ -586,7 +582,6 @@ fn done(function: &Name) -> Identifier {
     identifier(&format!("{DONE}{function}"))
 }
 
-/// Returns the companion of a function with the same arguments.
 fn done_atom(atom: &Atom) -> Atom {
     Atom { predicate: done(&atom.predicate.name), ..atom.clone() }
 }

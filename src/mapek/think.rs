@@ -120,7 +120,7 @@ impl ParallelSearch {
         self.cancelled = 0;
     }
 
-    /// Interrupts the search. Its result must be ignored, which [`Self::end`] also says.
+    /// Interrupts the search. Its result must be ignored: [`Self::end`] then returns `true`.
     pub fn interrupt(&mut self) {
         self.running = None;
     }

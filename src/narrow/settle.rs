@@ -90,7 +90,6 @@ fn classes<'c>(conditions: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(N
         match part {
             Condition::And(conjuncts) => parts.extend(conjuncts),
             Condition::Atom(atom) if !varying.contains(&atom.predicate.name) => {
-                // Only unary predicates are classes.
                 if let [argument] = &atom.arguments[..] {
                     found_classes.push((atom.predicate.name.clone(), argument));
                 }
@@ -239,7 +238,6 @@ impl Unfold<'_> {
         })
     }
 
-    /// Returns `true` if a clause derives the predicate `head` for all members of a class.
     fn holds_of_all(&self, class: &Name) -> bool {
         let is_inclusion = |clause: &Clause| match (&clause.body[..], &clause.arguments[..]) {
             ([Literal::Holds(name, operands)], [Operand::Variable(_)]) => {

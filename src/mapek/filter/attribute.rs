@@ -89,11 +89,11 @@ pub(crate) struct AttributeFilter {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct AttributeState {
     believed: Option<BigRational>,
-    /// Last plausible sample; `None` after silence.
+    /// Last plausible sample; `None` before the first sample and after silence.
     plausible: Option<BigRational>,
     /// Last sample rejected as a jump; `None` after a plausible sample.
     suspect: Option<BigRational>,
-    /// Last plausible samples since the last confirmed crossing, oldest first.
+    /// Latest plausible samples, oldest first. Cleared by silence, and by a confirmed crossing if no other crossing is pending.
     recent: VecDeque<BigRational>,
     /// Crossings of the bounds, in their order; `None` for a bound that the last sample has not crossed.
     crossings: Vec<Option<Crossing>>,
@@ -384,7 +384,7 @@ impl AttributeFilter {
     }
 }
 
-/// Compares two numbers. Faster than [`BigRational::cmp`], which divides, if all integers have 64 bits.
+/// Compares two numbers. Faster than [`BigRational::cmp`], which divides, if numerators and denominators fit into 64 bits.
 pub(super) fn compare(left: &BigRational, right: &BigRational) -> Ordering {
     let parts = |number: &BigRational| Some((number.numer().to_i64()?, number.denom().to_i64()?));
     match (parts(left), parts(right)) {
@@ -404,7 +404,6 @@ impl Bound {
         }
     }
 
-    /// Returns `true` if exactly one of two values satisfies the bound.
     fn is_crossed(&self, believed: &BigRational, value: &BigRational) -> bool {
         self.keeps(believed) != self.keeps(value)
     }

@@ -122,7 +122,6 @@ impl Filters {
         }
     }
 
-    /// Returns `true` if there is a filter for the attribute, given by local name.
     pub(crate) fn has(&self, attribute: &str) -> bool {
         self.measured.contains_key(attribute)
     }
