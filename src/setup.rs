@@ -283,7 +283,6 @@ impl Setup {
     }
 }
 
-/// Returns the documents, rule files and catalogs of a knowledge base.
 fn files_of(knowledge: &Knowledge) -> Vec<PathBuf> {
     let sources = knowledge.sources();
     let rules = sources.rules.iter().filter(|rule| ![COADAPTATION, TOMASYS].contains(&rule.as_str()));
