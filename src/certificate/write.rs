@@ -92,7 +92,6 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     write_with(directory, contents, knowledge::files(contents.mission)?.into_iter().flatten(), limits)
 }
 
-/// Writes the certificate of a solution with the given files of the knowledge base.
 pub(super) fn write_with(
     directory: &Path,
     contents: &Contents<'_>,
@@ -148,7 +147,6 @@ pub(super) fn write_with(
     whole.commit().map_err(failed)
 }
 
-/// Returns the sizes and digests of files.
 pub(super) fn listed<'n>(
     directory: &Path,
     names: impl Iterator<Item = &'n str>,

@@ -81,8 +81,7 @@ fn explain_design(
     Ok(explanation.complete)
 }
 
-/// Explains which changes of the situation lead to another plan. Returns `true` if no limit was
-/// reached.
+/// Prints the smallest changes of the situation that lead to another plan. Returns `true` if no limit was reached.
 fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<bool, Failure> {
     let changes = planning(common, limits, |hear| smallest_changes(mission, limits, hear))?;
     match common.format {
@@ -193,9 +192,6 @@ fn why_text(why: &Availability) -> String {
     text
 }
 
-/// Formats the best plan, and the best plan with this design as the only one of its functions. If
-/// the best plan uses the design, the best plan without it follows. At the end are changes of the
-/// design's availability.
 fn design_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, .. } = found;
     let mut text = String::new();

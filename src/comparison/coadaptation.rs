@@ -357,7 +357,6 @@ impl Coadaptation {
         (energy / BigRational::from(BigInt::from(unit))).ceil().to_integer().to_u32().unwrap_or(u32::MAX)
     }
 
-    /// Checks that all probabilities are from 0 to 1, and that no time or energy is negative (M122).
     pub(super) fn checked(self) -> Result<Self, Errors> {
         let (zero, one) = (BigRational::zero(), BigRational::one());
         let mut problems = Vec::new();
@@ -410,7 +409,6 @@ impl Coadaptation {
     }
 }
 
-/// Converts a rational number of battery levels to an integer. Returns M122 if the number is out of range.
 fn battery_levels(name: &str, levels: &BigRational) -> Result<u32, Errors> {
     levels.to_integer().to_u32().ok_or_else(|| {
         let text = format!("`{name}` is {levels} battery levels; it must be between 0 and {}", u32::MAX);

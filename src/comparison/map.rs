@@ -171,7 +171,6 @@ pub(super) fn object(name: &str) -> String {
     safe.to_ascii_lowercase()
 }
 
-/// Returns line and column, both from 1, at which `part`, a slice of `text`, begins.
 fn place(text: &str, part: &str) -> (usize, usize) {
     let offset = (part.as_ptr() as usize).saturating_sub(text.as_ptr() as usize);
     let before = text.get(..offset).unwrap_or_default();

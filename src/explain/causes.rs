@@ -52,10 +52,8 @@ pub struct Availability {
     pub unexamined: Vec<String>,
 }
 
-/// Sets of alterations that make a design available.
 struct Ways {
     sets: Vec<Vec<Alteration>>,
-    /// Alterations that were not examined, in words.
     unexamined: Vec<String>,
 }
 
@@ -301,7 +299,6 @@ pub(super) fn in_situation(
     best(&mission, limits)
 }
 
-/// Returns each alteration of the repairs once, with the best plan after this alteration alone.
 pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> Result<Vec<Change>, Errors> {
     let mut changes: Vec<Change> = Vec::new();
     for alteration in repairs.iter().flat_map(|repair| &repair.alterations) {
@@ -352,8 +349,8 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign, rules: &RuleBounds
     alterations
 }
 
-/// Adds alterations that concern all designs to `candidates_found`: recoveries of failed
-/// components, and changes of measurements. Failures are not added.
+/// Adds further alterations to `candidates_found`: the recovery of each failed component, and changes of measurements that concern any design.
+/// Failures are not added.
 fn all_candidates(
     knowledge: &Knowledge,
     mut candidates_found: Vec<Alteration>,

@@ -18,7 +18,6 @@ use crate::knowledge::{Knowledge, VALUE_PROPERTIES, ValueRead};
 const BOUND: &[&str] = &["hasMinimum", "hasMaximum"];
 const AVAILABILITY: &[&str] = &["fd_realisability", "fd_available"];
 
-/// Result of [`rule_bounds`].
 #[derive(Debug, Clone, Default)]
 pub(super) struct RuleBounds {
     /// Comparisons of measured values with numbers.
@@ -46,7 +45,6 @@ impl RuleBound {
     }
 }
 
-/// Returns the bounds with which the rules of a knowledge base compare measured values.
 pub(super) fn rule_bounds(knowledge: &Knowledge) -> RuleBounds {
     let measurements = knowledge.view().measurements();
     let engine = knowledge.engine();
@@ -300,7 +298,6 @@ fn contain(variables: &BTreeSet<Variable>, terms: &[Term]) -> bool {
     terms.iter().any(|term| term.as_variable().is_some_and(|variable| variables.contains(&variable)))
 }
 
-/// Returns the atoms in the body of a rule, and those in its aggregates.
 fn atoms(rule: &Rule) -> impl Iterator<Item = &Atom> {
     rule.body.iter().flat_map(|atom| std::iter::once(atom).chain(atom.parts()))
 }

@@ -42,7 +42,6 @@ pub(super) enum End {
 }
 
 impl Segment {
-    /// Returns `true` if the segment ends with an `end` record, which refers to the next segment.
     pub(super) fn is_closed(&self) -> bool {
         self.records.last().is_some_and(|record| record.kind == "end")
     }

@@ -203,7 +203,6 @@ fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
     send(stream, &(head + &text))
 }
 
-/// Sends the event stream to a client until the run ends, the client disconnects, or the client is too slow.
 fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,

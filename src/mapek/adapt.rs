@@ -37,7 +37,6 @@ const MAX_RETRY: Duration = Duration::from_secs(3600);
 /// Entry of `Beliefs::improvement_causes`, among the names of designs, that represents changed facts.
 const FACTS: &str = "facts";
 
-/// Reason for planning, which determines the condition under which the new plan is adopted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Need {
     /// The action under way could not continue unchanged. Other designs for it, or its suspension, were requested.
@@ -336,8 +335,6 @@ impl Adaptation<'_> {
         running.chain(plan).map(key).eq(steps.iter().map(key))
     }
 
-    /// Sets the durations and costs of the current plan, without the action under way, to those of `steps`, which are
-    /// the same plan in the present situation.
     fn update_costs(&mut self, steps: &[PlannedStep]) {
         let present = steps.iter().skip(usize::from(self.beliefs.running.is_some()));
         for (step, present) in self.beliefs.plan.iter_mut().flatten().zip(present) {

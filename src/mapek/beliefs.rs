@@ -53,7 +53,6 @@ pub struct Beliefs {
     pub(super) outstanding: BTreeMap<u64, Effect>,
     pub(super) receipts: Receipts,
     pub(super) waits: BTreeMap<u64, Wait>,
-    /// Whether the robot has ever reported the start or the progress of an action.
     pub(super) reports_actions: bool,
     pub(super) lines: u64,
     pub(super) numbers: Numbers,
@@ -76,7 +75,6 @@ pub(super) struct Running {
     pub(super) suspended: bool,
     /// Whether the action is suspended only until planning has finished.
     pub(super) provisional: bool,
-    /// Number of the effect that requested the action.
     pub(super) request: u64,
     /// Time of the request or of the last report, since the start of the mission.
     pub(super) last_report: Duration,

@@ -30,7 +30,6 @@ pub(super) struct Changes {
     pub(super) filtered: Vec<Answer>,
 }
 
-/// Extent of a change of the knowledge base.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(super) enum Base {
     #[default]
@@ -42,7 +41,6 @@ pub(super) enum Base {
 }
 
 impl Changes {
-    /// Returns `true` if the knowledge base or an input of planning has changed, or if there is a reason to plan.
     pub(super) fn any(&self) -> bool {
         self.base > Base::Nothing || self.facts || self.predicates || !self.reasons.is_empty()
     }

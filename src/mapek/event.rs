@@ -191,7 +191,6 @@ fn fraction_schema(_: &mut SchemaGenerator) -> Schema {
     })
 }
 
-/// JSON Schema of a field that must be present but may be null.
 fn name_or_null_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "null"] })
 }
@@ -392,7 +391,6 @@ const KINDS: [&str; 17] = [
 
 const STATUSES: &str = "`FALSE` or `ERROR`, `RECOVERED`, `TRUE` or `OK`, or a truth value";
 
-/// Parses a status in the spelling of MROS or PLANTA, or a truth value.
 fn status(text: &str) -> Option<Status> {
     match text.to_ascii_uppercase().as_str() {
         "FALSE" | "ERROR" => Some(Status::Failed),

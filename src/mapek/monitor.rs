@@ -39,7 +39,6 @@ const PLANNED: [&str; 9] = [
 
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
-    /// IRIs and local names of the quality attributes of the knowledge base.
     pub(super) attributes: BTreeSet<String>,
     /// Attributes whose measured value cannot have an effect. Their measurements are refused.
     pub(super) unused_attributes: BTreeSet<String>,
@@ -136,7 +135,6 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Updates the knowledge base with a report about the individual `name`. `kind` is the noun for error messages.
     pub(super) fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
         let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
             let text = format!("without a knowledge base there is no {kind} `{name}`");
@@ -259,7 +257,6 @@ impl BeliefUpdate<'_> {
         running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))
     }
 
-    /// Records that an action has started. This also confirms that its request has arrived.
     fn confirm_started(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let request = self.running(action)?.request;
         self.beliefs.confirm_request(request);

@@ -284,7 +284,6 @@ fn changed_predicates(effect: &Effect) -> BTreeSet<Name> {
     predicates
 }
 
-/// Removes the start conditions about facts that the action itself changes.
 fn waive_start_conditions(action: &mut Action, is_changed: impl Fn(&Atom) -> bool) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => waive(precondition, &is_changed),
@@ -296,7 +295,6 @@ fn waive_start_conditions(action: &mut Action, is_changed: impl Fn(&Atom) -> boo
     }
 }
 
-/// Removes the conjuncts that are literals of changed facts.
 fn waive(condition: &mut Condition, is_changed: &impl Fn(&Atom) -> bool) {
     let is_waived = match condition {
         Condition::And(parts) => {
@@ -321,7 +319,6 @@ struct Shortening<'a> {
     /// which the end effects could violate start conditions.
     time_left: BigRational,
     gradual: &'a BTreeSet<Name>,
-    /// Functions with companions.
     restored: &'a BTreeSet<Name>,
     /// Changed values, each with the difference between its changes by the whole action: with the open designs, minus with the past designs.
     differences: Vec<(Atom, Expression)>,
@@ -334,7 +331,6 @@ impl<'a> Shortening<'a> {
         Self { progress, remaining_share, time_left, gradual, restored, differences: Vec::new() }
     }
 
-    /// Collects the differences between the changes with open designs and those that the progress has made.
     fn compare_designs(&mut self, schema: &Action, remainder: &Remainder<'_>) {
         let step = remainder.step;
         let context = step.context();
@@ -492,7 +488,6 @@ impl<'a> Shortening<'a> {
         }
     }
 
-    /// Subtracts the past changes from a value that the copy reads.
     fn restore(&self, leaf: &mut Expression) {
         if let Expression::Fluent(atom) = leaf
             && self.restored.contains(&atom.predicate.name)

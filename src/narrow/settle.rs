@@ -135,8 +135,6 @@ fn is_bound(term: &Term, bound: &[&Name]) -> bool {
 /// or if the predicate may have a large extension).
 pub(super) type Parted = (BTreeMap<Name, Vec<Clause>>, BTreeMap<Name, Option<Vec<Clause>>>);
 
-/// Unfolds clauses until no further predicate becomes settled (see the head of this file). Returns the clauses of the
-/// settled and of the open predicates.
 pub(super) fn settle(
     mut clauses_by_head: BTreeMap<Name, Option<Vec<Clause>>>,
     changed: &BTreeSet<Name>,

@@ -16,9 +16,7 @@ use crate::report::{Positions, Seen, front_sheet, plan_picture};
 /// Ground task. Tasks of sequential plans are retained for certificates.
 #[derive(Debug)]
 pub(super) enum Ground {
-    /// Costs and values are integers.
     Integers(Task),
-    /// Costs and values are rationals of any size.
     Exact(ExactTask),
     /// Actions overlap. The metric's fluents in `not_minimised` were not minimised.
     Concurrent { not_minimised: Vec<String> },

@@ -53,7 +53,6 @@ fn seeds() -> Vec<String> {
 }
 
 impl Sections {
-    /// Returns the keys in braces in the command and the generator. Other keys are options of the command.
     fn placeholders(&self) -> BTreeSet<&str> {
         let generator = self.generate.iter().flat_map(|generate| &generate.run);
         self.command.iter().chain(generator).flat_map(|word| placeholders(word)).collect()
@@ -402,7 +401,6 @@ impl Study {
     }
 }
 
-/// Returns the names in braces, e.g. `key` for `{key}`, in a word of a command.
 fn placeholders(word: &str) -> impl Iterator<Item = &str> {
     word.split('{').skip(1).filter_map(|rest| rest.split_once('}').map(|(name, _)| name))
 }

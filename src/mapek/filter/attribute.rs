@@ -116,10 +116,7 @@ struct Crossing {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Hold {
     Range,
-    /// The sample is implausibly far from the last plausible sample, and from the last sample that was held for this
-    /// reason.
     Jump,
-    /// The sample satisfies a violated bound, but by less than the hysteresis.
     Hysteresis,
     /// Samples have crossed a bound for too short a time, or too few of them agree.
     Debounce,
@@ -284,7 +281,6 @@ impl AttributeFilter {
         Some(state.last_sample_time.unwrap_or(0).saturating_add(period).saturating_add(1))
     }
 
-    /// Returns the earliest time at which the crossing of a bound is confirmed without another sample.
     fn crossing_due(&self, state: &AttributeState) -> Option<Micros> {
         let crossings = self.bounds.iter().zip(&state.crossings);
         crossings.filter_map(|(bound, crossing)| self.confirmed_from(state, bound, crossing.as_ref()?)).min()
@@ -408,7 +404,6 @@ impl Bound {
         self.keeps(believed) != self.keeps(value)
     }
 
-    /// Returns `true` if a value satisfies the bound by at least its band (hysteresis).
     pub(crate) fn keeps_clearly(&self, value: &BigRational) -> bool {
         match self.side {
             Side::Least => compare(value, &(&self.value + &self.band)).is_ge(),
