@@ -4,7 +4,7 @@
 //! read. So the same lines give the same answers.
 //!
 //! If lines arrive from a pipe or a terminal, the loop reacts to all waiting lines before it
-//! deliberates. Only a line about an action that was not requested yet waits for the deliberation.
+//! deliberates. Only a line about an action or effect that was not requested yet waits for the deliberation.
 //! Plans are computed on another thread while the loop keeps reacting. A line that changes the
 //! planning problem cancels the search, but only a few times in a row.
 

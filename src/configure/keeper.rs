@@ -187,7 +187,7 @@ impl Keeper {
         self.numbers.missing()
     }
 
-    /// Returns the configurator, with the knowledge and the served objectives.
+    /// Returns the configurator, with the knowledge and the objectives.
     pub fn configurator(&self) -> &Configurator {
         &self.configurator
     }

@@ -1,7 +1,7 @@
 //! Events: reports of the managed system, one JSON object per line, in the format `metaplan-events/1`.
 //!
 //! Objects in the form of `diagnostic_msgs/DiagnosticArray`, as published by the MROS observers \[1\], are accepted,
-//! too. Other input is refused (see [`Refusal`]) and changes nothing.
+//! too. Other input is refused (see [`Refusal`]).
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 

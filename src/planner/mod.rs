@@ -229,8 +229,8 @@ impl<'m, 'r> Planner<'m, 'r> {
             let mut problem = self.problem.clone();
             let objective = objectives.parsed.first();
             problem.metric = objective.map(|objective| objective.metric.clone()).or(problem.metric);
-            // The removal of superfluous actions may take half of the extended time; the other half is for the
-            // validator.
+            // The removal of superfluous actions may take half of the extended time, because the validation of the
+            // plan follows.
             solution.plan = Some(lean(self.mission, &problem, plan, &reading, &limits.extended().half()));
         }
         let point = valued(solution, &objectives);
