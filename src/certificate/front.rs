@@ -92,7 +92,6 @@ pub fn write_front(
     whole.commit().map_err(failed)
 }
 
-/// Writes the certificate that the plan of `point` is optimal for `problem`, with the metric `value`.
 fn write_member(
     directory: &Path,
     (mission, problem): (&Mission, &Problem),

@@ -73,8 +73,6 @@ pub struct Contents<'c> {
 }
 
 impl Contents<'_> {
-    /// Executes the plan with the validator and returns its cost. Returns an error if the plan is
-    /// invalid or its cost differs from that of the solution.
     fn metric(&self, limits: &Limits) -> Result<Option<BigRational>, String> {
         let Some(found) = &self.solution.plan else { return Ok(None) };
         let (domain, cost) = (self.mission.domain(), found.cost.to_string());

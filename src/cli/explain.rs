@@ -81,7 +81,6 @@ fn explain_design(
     Ok(explanation.complete)
 }
 
-/// Prints the smallest changes of the situation that lead to another plan. Returns `true` if no limit was reached.
 fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<bool, Failure> {
     let changes = planning(common, limits, |hear| smallest_changes(mission, limits, hear))?;
     match common.format {
@@ -160,7 +159,6 @@ fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     }
 }
 
-/// Describes an alteration. `about` marks the bound as approximate.
 fn alteration_text(alteration: &Alteration, about: bool) -> String {
     let Alteration { name, from, to } = alteration;
     let now = from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();

@@ -346,8 +346,6 @@ fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Ar
     statistics + &values + &makespan + &alternatives_text.or(blocking).unwrap_or_default()
 }
 
-/// Formats the answer in the requested format. Returns `None` if the format can express only a plan, and there is no
-/// plan.
 fn show(
     planned: &Planned<'_>,
     mission: &Mission,

@@ -521,7 +521,6 @@ fn words(atom: &Atom) -> (String, Vec<String>) {
     (atom.predicate.name.as_str().to_ascii_lowercase(), atom.arguments.iter().map(argument).collect())
 }
 
-/// Returns the last argument of the goal's first atom with the predicate `location`.
 fn goal(condition: &Condition, location: &str) -> Option<String> {
     match condition {
         Condition::Atom(atom) => {

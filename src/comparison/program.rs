@@ -67,9 +67,7 @@ pub(super) fn flag(name: &str) -> Variable {
 struct ProcessWriter<'a> {
     mission: &'a Coadaptation,
     risk: Risk,
-    /// Names of the actions that change to each configuration.
     sets: Vec<String>,
-    /// Names of the moves along each arc.
     moves: Vec<String>,
 }
 

@@ -368,8 +368,6 @@ fn all_candidates(
     candidates_found
 }
 
-/// Returns the recovery of each failed component or, with `working`, the failure of each working
-/// component. `is_own` selects components by IRI.
 fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
     let components = knowledge.view().components().into_iter();
     let components = components.filter(|component| is_own(&component.individual.iri));

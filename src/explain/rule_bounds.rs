@@ -26,7 +26,6 @@ pub(super) struct RuleBounds {
     pub unexamined: Vec<String>,
 }
 
-/// An alteration of a measured value that changes the outcome of a comparison in a rule.
 #[derive(Debug, Clone)]
 pub(super) struct RuleBound {
     pub alteration: Alteration,
@@ -139,7 +138,6 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the variables of a rule whose values depend on measured values.
     fn dependent(&self, reads: &RuleReads<'_>, carriers: &BTreeSet<Symbol>) -> BTreeSet<Variable> {
         let mut dependent: BTreeSet<Variable> = reads.measured.keys().copied().collect();
         for atom in atoms(reads.rule) {

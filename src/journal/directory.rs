@@ -22,7 +22,6 @@ pub(super) struct Segment {
     pub(super) digest: String,
     pub(super) before: Link,
     pub(super) after: Link,
-    /// Records of the segment before its first fault, without the header.
     pub(super) records: Vec<Record>,
     /// Number of bytes at the beginning of the file that contain the header and `records`.
     pub(super) sound: u64,

@@ -327,7 +327,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if `steps` are the current plan. Compares only actions and their arguments.
     fn is_current(&self, steps: &[PlannedStep]) -> bool {
         let key = |step: &PlannedStep| (step.action.clone(), step.arguments.clone());
         let Some(plan) = &self.beliefs.plan else { return false };

@@ -46,9 +46,7 @@ pub struct Beliefs {
     pub(super) improvement_causes: BTreeSet<String>,
     /// Time at which the last entry of `improvement_causes` was added, since the start of the mission.
     pub(super) improvement_since: Duration,
-    /// Number of requested actions, which is also the number of the last one.
     pub(super) actions: u64,
-    /// Number of created effects, which is also the number of the last one.
     pub(super) effects: u64,
     pub(super) outstanding: BTreeMap<u64, Effect>,
     pub(super) receipts: Receipts,

@@ -130,7 +130,6 @@ fn same_but_last(left: &Atom, right: &Atom) -> bool {
         && but_last(left) == but_last(right)
 }
 
-/// Returns the objects of a type and its subtypes, in the order of the files.
 fn objects(domain: &Domain, problem: &Problem, r#type: &TypeExpression) -> Vec<Name> {
     let object = Name::new("object");
     let mut below: BTreeSet<&Name> = names(r#type).collect();

@@ -107,7 +107,6 @@ pub(crate) struct AttributeState {
 /// Latest samples without a gap that lie on the other side of a bound than the believed value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Crossing {
-    /// Time of the first of these samples.
     since: Micros,
     /// The one of these samples that is nearest to the believed value, after hysteresis.
     nearest: BigRational,

@@ -98,7 +98,6 @@ pub(super) fn needed(action: &Action) -> Vec<&Atom> {
     functions
 }
 
-/// Collects the functions in comparisons that must hold for the condition to hold.
 pub(super) fn in_condition<'a>(condition: &'a Condition, needed: &mut Vec<&'a Atom>) {
     match condition {
         Condition::And(parts) => parts.iter().for_each(|part| in_condition(part, needed)),
