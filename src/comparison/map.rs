@@ -1,8 +1,9 @@
 //! Parses the maps of Cámara et al. (JSON). Keeps the position in the text of names and measurements that may be
 //! faulty, for messages.
 //!
-//! A place has `node-id`, `connected-to` and `coords`. Maps of 2017, for the first robots of the Rainbow project, have `coord` instead of `coords`,
-//! no measurements, and rectangles that the robot should avoid (`unsafe-rects`). No corridor crosses these rectangles.
+//! A place has `node-id`, `connected-to` and `coords`. Maps of 2017, for the first robots of the Rainbow project, have
+//! `coord` instead of `coords`, no measurements, and rectangles that the robot should avoid (`unsafe-rects`). No
+//! corridor crosses these rectangles.
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Deserializer, de};

@@ -99,8 +99,8 @@ pub enum Verdict {
     RuledOut(Vec<String>),
     /// The design is not better than the chosen one: it misses more requirements, or equally many without more utility.
     Less,
-    /// The design is usable and preferred to the chosen one, if any, but conflicts with designs of other objectives, or a limit was reached before it
-    /// was considered. The reason is a sentence.
+    /// The design is usable and preferred to the chosen one, if any, but conflicts with designs of other objectives, or
+    /// a limit was reached before it was considered. The reason is a sentence.
     Together(String),
 }
 

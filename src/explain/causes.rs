@@ -39,7 +39,8 @@ pub struct Availability {
     pub functions: Vec<String>,
     /// `true` if the design is available.
     pub available: bool,
-    /// Rules and facts that rule the design out, and reasons why some actions could not use the design even if it were available.
+    /// Rules and facts that rule the design out, and reasons why some actions could not use the design even if it were
+    /// available.
     pub because: Vec<String>,
     /// Failed components and measurements that contribute to ruling the design out.
     pub causes: Vec<Cause>,
@@ -349,8 +350,8 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign, rules: &RuleBounds
     alterations
 }
 
-/// Adds further alterations to `candidates_found`: the recovery of each failed component, and changes of measurements that concern any design.
-/// Failures are not added.
+/// Adds further alterations to `candidates_found`: the recovery of each failed component, and changes of measurements
+/// that concern any design. Failures are not added.
 fn all_candidates(
     knowledge: &Knowledge,
     mut candidates_found: Vec<Alteration>,

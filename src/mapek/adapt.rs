@@ -28,8 +28,8 @@ use crate::number;
 /// Number of consecutive failures of one step after which the plan is dropped and planning pauses.
 const MAX_FAILURES: u32 = 3;
 
-/// Minimum base of the pauses after searches without a proved outcome. The base is the time limit of a search if that is longer. The first pause is
-/// twice the base. Each further pause is twice the previous one, at most [`MAX_RETRY`].
+/// Minimum base of the pauses after searches without a proved outcome. The base is the time limit of a search if that
+/// is longer. The first pause is twice the base. Each further pause is twice the previous one, at most [`MAX_RETRY`].
 const MIN_RETRY: Duration = Duration::from_secs(10);
 
 const MAX_RETRY: Duration = Duration::from_secs(3600);
@@ -200,9 +200,10 @@ impl Adaptation<'_> {
         self.beliefs.retry = Some(Retry { at, attempt: attempt + 1 });
     }
 
-    /// Searches for a plan for the reasons `because`, and adopts it unless it is the current plan. With [`Need::Better`], the plan is adopted only if
-    /// its benefit is sufficient. With the other needs, the action under way may be cancelled or suspended instead. Decides nothing if a search is
-    /// necessary and the planner may not search.
+    /// Searches for a plan for the reasons `because`, and adopts it unless it is the current plan. With
+    /// [`Need::Better`], the plan is adopted only if its benefit is sufficient. With the other needs, the action under
+    /// way may be cancelled or suspended instead. Decides nothing if a search is necessary and the planner may not
+    /// search.
     pub(super) fn replan(&mut self, because: Vec<String>, need: Need, answers: &mut Vec<Answer>) {
         let is_necessary = need != Need::Better;
         let reason = because.first().cloned().unwrap_or_default();
@@ -342,8 +343,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns the reason to keep the current plan. Returns `None` if the benefit of `outcome` is sufficient, or if a metric value cannot be
-    /// computed.
+    /// Returns the reason to keep the current plan. Returns `None` if the benefit of `outcome` is sufficient, or if a
+    /// metric value cannot be computed.
     fn insufficient_benefit(&self, outcome: &Outcome) -> Option<String> {
         let (current_metric, metric) = if self.beliefs.mission.problem().metric.is_some() {
             (self.beliefs.metric()?, outcome.cost.clone())

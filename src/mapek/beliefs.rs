@@ -179,8 +179,8 @@ impl Beliefs {
         &self.configuration
     }
 
-    /// Returns the function and the requested design of each outstanding reconfiguration. A reconfiguration is not outstanding after its
-    /// acknowledgement, failure or deadline, or after a later one has superseded it.
+    /// Returns the function and the requested design of each outstanding reconfiguration. A reconfiguration is not
+    /// outstanding after its acknowledgement, failure or deadline, or after a later one has superseded it.
     pub fn pending(&self) -> impl Iterator<Item = (&str, &str)> {
         self.outstanding.values().filter_map(|effect| match &effect.command {
             Command::Reconfigure { function, to, .. } => Some((function.as_str(), to.as_str())),
@@ -188,8 +188,8 @@ impl Beliefs {
         })
     }
 
-    /// Returns `true` if a reconfiguration of the function is outstanding, or was superseded or given up without an answer. The function's actual
-    /// design may then differ from the believed one.
+    /// Returns `true` if a reconfiguration of the function is outstanding, or was superseded or given up without an
+    /// answer. The function's actual design may then differ from the believed one.
     pub fn is_unsettled(&self, function: &str) -> bool {
         self.pending().any(|(name, _)| name == function) || self.receipts.has_superseded(function)
     }

@@ -189,7 +189,8 @@ fn next_deadline_after(running: &Running, settings: &Settings) -> Duration {
     allowed_silence(running, settings).saturating_mul(running.overdue.saturating_add(1))
 }
 
-/// Time without reports after which an action is first overdue: `deadline_factor` times its expected duration, but at least `settings.deadline`.
+/// Time without reports after which an action is first overdue: `deadline_factor` times its expected duration, but at
+/// least `settings.deadline`.
 fn allowed_silence(running: &Running, settings: &Settings) -> Duration {
     let expected = number::to_f64(&running.step.duration) * settings.time_unit.seconds();
     let allowed_silence =

@@ -309,7 +309,8 @@ impl BeliefUpdate<'_> {
 
     fn failed(&mut self, action: u64) -> Result<(), Refusal> {
         let step = self.ended_early(action)?.step;
-        // Only consecutive failures of one step count. Steps are compared without duration and cost, which depend on the situation.
+        // Only consecutive failures of one step count. Steps are compared without duration and cost, which depend on
+        // the situation.
         let before = self.beliefs.failures.take().filter(|(failed, _)| failed.has_same_action(&step));
         let count = before.map_or(1, |(_, count)| count + 1);
         self.beliefs.failures = Some((step, count));
@@ -389,8 +390,8 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Sets a fact or a value of the problem. Returns `true` if this changes the believed state. If a fact or function that was not checked before
-    /// does not fit the domain, restores the previous state and returns a refusal.
+    /// Sets a fact or a value of the problem. Returns `true` if this changes the believed state. If a fact or function
+    /// that was not checked before does not fit the domain, restores the previous state and returns a refusal.
     fn set(&mut self, name: &str, value: &str) -> Result<bool, Refusal> {
         let mission = &mut self.beliefs.mission;
         let key = if mission.is_function(name) { name.to_owned() } else { format!("{name} {value}") };

@@ -9,8 +9,8 @@
 //! The copy may read a value that the progress of the action has already changed: in conditions, in the amounts of its
 //! effects, and in its duration. The action reads the value without these changes. Therefore, each such function `F`
 //! has a companion function `metaplan_done_F`, which contains the past change of each value, and the copy reads
-//! `F - metaplan_done_F`. Past increases at start are part of the values that conditions and effects at the end read.
-//! Therefore, the copy removes these increases from the companion at its start.
+//! `F - metaplan_done_F`. Past changes at start are part of the values that conditions and effects at the end read.
+//! Therefore, the copy removes these changes from the companion at its start.
 //!
 //! The past changes were made with the designs of the past. With other designs, the amounts may differ. A condition such
 //! as a sufficient battery level is then about the remaining share of the new amounts. Therefore, conditions read the
@@ -320,7 +320,8 @@ struct Shortening<'a> {
     time_left: BigRational,
     gradual: &'a BTreeSet<Name>,
     restored: &'a BTreeSet<Name>,
-    /// Changed values, each with the difference between its changes by the whole action: with the open designs, minus with the past designs.
+    /// Changed values, each with the difference between its changes by the whole action: with the open designs, minus
+    /// with the past designs.
     differences: Vec<(Atom, Expression)>,
 }
 

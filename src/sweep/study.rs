@@ -141,9 +141,9 @@ pub struct Study {
     sections: Sections,
     /// Directory of the study's file, which is the working directory of the runs.
     pub directory: PathBuf,
-    /// Checksum of the study's command, generator, time limit and values, of the files whose paths are words of the command, of all files of missions
-    /// among them, and of the program's version. It does not cover the imports of a knowledge base that the command names itself, the files of the
-    /// generator, and files in `{dir}`.
+    /// Checksum of the study's command, generator, time limit and values, of the files whose paths are words of the
+    /// command, of all files of missions among them, and of the program's version. It does not cover the imports of a
+    /// knowledge base that the command names itself, the files of the generator, and files in `{dir}`.
     pub digest: String,
     /// Varied keys with their values. The value of the last key changes from each run to the next.
     keys: Vec<(String, Vec<Value>)>,
@@ -463,8 +463,8 @@ fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
     Ok((0..count).map(|number| json!(pairs[number * pairs.len() / count])).collect())
 }
 
-/// Returns a word of the command for all values of its keys in braces. `{dir}` is not replaced, because files in the directory of a run are not files
-/// of the study.
+/// Returns a word of the command for all values of its keys in braces. `{dir}` is not replaced, because files in the
+/// directory of a run are not files of the study.
 fn instances(word: &str, keys: &[(String, Vec<Value>)]) -> Vec<String> {
     let mut words = vec![word.to_owned()];
     for (key, values) in keys {

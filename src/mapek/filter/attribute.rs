@@ -93,7 +93,8 @@ pub(crate) struct AttributeState {
     plausible: Option<BigRational>,
     /// Last sample rejected as a jump; `None` after a plausible sample.
     suspect: Option<BigRational>,
-    /// Latest plausible samples, oldest first. Cleared by silence, and by a confirmed crossing if no other crossing is pending.
+    /// Latest plausible samples, oldest first. Cleared by silence, and by a confirmed crossing if no other crossing is
+    /// pending.
     recent: VecDeque<BigRational>,
     /// Crossings of the bounds, in their order; `None` for a bound that the last sample has not crossed.
     crossings: Vec<Option<Crossing>>,
@@ -379,7 +380,8 @@ impl AttributeFilter {
     }
 }
 
-/// Compares two numbers. Faster than [`BigRational::cmp`], which divides, if numerators and denominators fit into 64 bits.
+/// Compares two numbers. Faster than [`BigRational::cmp`], which divides, if numerators and denominators fit into 64
+/// bits.
 pub(super) fn compare(left: &BigRational, right: &BigRational) -> Ordering {
     let parts = |number: &BigRational| Some((number.numer().to_i64()?, number.denom().to_i64()?));
     match (parts(left), parts(right)) {

@@ -72,8 +72,8 @@ pub(super) struct Numbers<'m> {
     pub(super) domain: &'m Domain,
     problem: Problem,
     types: TypeHierarchy,
-    /// Predicates that are not static: actions or timed initial literals change them, axioms derive them, or they express the availability of
-    /// designs.
+    /// Predicates that are not static: actions or timed initial literals change them, axioms derive them, or they
+    /// express the availability of designs.
     dynamic: HashSet<Name>,
     changed: HashSet<Name>,
     assigned: HashSet<Name>,
