@@ -210,7 +210,6 @@ fn file_suggestion(file: &Path) -> String {
     did_you_mean(name, names.iter().map(String::as_str))
 }
 
-/// Removes each component `..` together with the directory before it from a path.
 fn shortened(path: &Path) -> PathBuf {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {

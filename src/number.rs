@@ -8,7 +8,6 @@ use serde_json::Value;
 /// exponent. Larger numbers would only consume memory.
 const MAX_CHARACTERS: usize = 40;
 
-/// Description of the numbers that [`exact`] accepts, for messages.
 pub(crate) const DECIMAL: &str = "a decimal number (at most 40 characters; exponent from -40 to 40)";
 
 /// Number of decimals to which values are rounded. Floating-point values of a robot would otherwise

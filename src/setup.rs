@@ -186,8 +186,6 @@ impl Setup {
         self.scenarios.iter().flat_map(|(name, scenario)| self.situation(name, scenario).1).collect()
     }
 
-    /// Returns the mission in the situation of a scenario, and the faults of this scenario as in
-    /// [`Setup::mistakes`].
     fn situation(&self, name: &str, scenario: &Scenario<Simulation>) -> (Mission, Vec<Message>) {
         let mut mission = self.mission.clone();
         let is_sound = mission.filled().is_ok();
@@ -238,7 +236,6 @@ impl Setup {
         Ok(positions)
     }
 
-    /// Returns an error M141 for each name in `report.positions` that is no numeric function with one parameter.
     fn unknown_functions(&self, functions: &[String; 2]) -> Vec<Message> {
         let of_places =
             self.mission.domain().functions.iter().filter(|function| function.parameters.len() == 1);
@@ -283,7 +280,6 @@ impl Setup {
     }
 }
 
-/// Returns the documents, rule files and catalogs of a knowledge base.
 fn files_of(knowledge: &Knowledge) -> Vec<PathBuf> {
     let sources = knowledge.sources();
     let rules = sources.rules.iter().filter(|rule| ![COADAPTATION, TOMASYS].contains(&rule.as_str()));

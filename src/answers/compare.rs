@@ -39,8 +39,8 @@ pub struct Row {
     pub kind: String,
     /// Name of the candidate.
     pub name: String,
-    /// Values of the measures, in the order of [`MEASURES`]. `None` if a measure is infinite or
-    /// undefined.
+    /// Values of the measures, in the order of [`MEASURES`]. `None` if a measure is infinite or undefined, or if there
+    /// is no hindsight bound on it.
     pub values: Vec<Option<f64>>,
 }
 

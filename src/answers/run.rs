@@ -63,8 +63,7 @@ impl ReadyLine {
     }
 }
 
-/// Output line that is repeated during planning, with the best plan's cost and the lower bound so
-/// far.
+/// Output line that is repeated during planning, with the cost of the incumbent and the current lower bound.
 #[derive(Debug, Clone, Serialize)]
 pub struct PlanningLine {
     answer: &'static str,

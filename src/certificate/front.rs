@@ -92,7 +92,6 @@ pub fn write_front(
     whole.commit().map_err(failed)
 }
 
-/// Writes the certificate that the plan of `point` is optimal for `problem`, with the metric `value`.
 fn write_member(
     directory: &Path,
     (mission, problem): (&Mission, &Problem),
@@ -121,7 +120,8 @@ fn write_member(
     write_with(directory, &contents, [], limits)
 }
 
-/// Returns the sum of operator costs of a plan with this value of the metric; `None` if no plan has this value.
+/// Returns the sum of operator costs of a plan with this value of the metric. Returns `None` if no plan has this value,
+/// or if the sum exceeds 128 bits.
 fn operator_costs(task: &Task, value: &Exact) -> Option<i128> {
     let scaled = value.to_rational() * BigInt::from(task.objective.scale);
     let scaled = if task.objective.maximize { -scaled } else { scaled };

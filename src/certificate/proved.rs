@@ -28,13 +28,9 @@ const NOT_PROVED: i32 = 30;
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// Maximum resident memory of each program, in kilobytes of 2^10 bytes.
 const MEMORY_LIMIT: u64 = 4 << 20;
-/// Beginning of a statement about a task with timed initial literals.
 const TIMED: &str = "proved, with timed initial literals: ";
-/// Beginning of every other statement.
 const UNTIMED: &str = "proved: ";
-/// Parts of a verification that the theorem makes statements about.
 const COVERED_PARTS: [&str; 3] = ["task", "plan", "argument"];
-/// Parts of the verification of a front that the theorem makes statements about.
 const COVERED_FRONT_PARTS: [&str; 2] = ["point", "front"];
 
 /// Paths of the programs of the proved checker.
@@ -187,7 +183,6 @@ enum Answer {
     None(String),
 }
 
-/// The end of a program: its exit status, or the reason for ending without one.
 enum Ended {
     Status(i32),
     Other(String),

@@ -73,8 +73,6 @@ pub struct Contents<'c> {
 }
 
 impl Contents<'_> {
-    /// Executes the plan with the validator and returns its cost. Returns an error if the plan is
-    /// invalid or its cost differs from that of the solution.
     fn metric(&self, limits: &Limits) -> Result<Option<BigRational>, String> {
         let Some(found) = &self.solution.plan else { return Ok(None) };
         let (domain, cost) = (self.mission.domain(), found.cost.to_string());
@@ -92,7 +90,6 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     write_with(directory, contents, knowledge::files(contents.mission)?.into_iter().flatten(), limits)
 }
 
-/// Writes the certificate of a solution with the given files of the knowledge base.
 pub(super) fn write_with(
     directory: &Path,
     contents: &Contents<'_>,
@@ -148,7 +145,6 @@ pub(super) fn write_with(
     whole.commit().map_err(failed)
 }
 
-/// Returns the sizes and digests of files.
 pub(super) fn listed<'n>(
     directory: &Path,
     names: impl Iterator<Item = &'n str>,

@@ -7,8 +7,6 @@ use planner::{Alternatives, Status};
 
 use crate::cli::plan_text::steps_text;
 
-/// Formats further optimal plans as tables. Also lists for each step of the first plan the choices
-/// that all optimal plans share.
 pub(super) fn text(found: Option<&Alternatives>, planned: &Planned<'_>, columns: Option<u16>) -> String {
     let Some(found) = found else {
         return if planned.solution.status == Status::Optimal {

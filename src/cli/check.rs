@@ -232,7 +232,6 @@ fn precision(arguments: &Arguments) -> Option<Precision> {
     precision.map(if absolute { Precision::Absolute } else { Precision::Relative })
 }
 
-/// Returns `true` if the result is decided and has the requested precision.
 fn is_proved(arguments: &Arguments, report: &Report) -> bool {
     let fits = precision(arguments).is_none_or(|precision| report.outcome.is_within(precision));
     fits && !matches!(report.outcome, Outcome::Undecided(_))

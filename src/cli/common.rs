@@ -33,7 +33,6 @@ impl Failure {
         Self { exit: Exit::Usage, messages: message.into() }
     }
 
-    /// Chooses the exit status by the message codes and by whether a limit is reached.
     pub(super) fn planning(messages: Errors, limits: &Limits) -> Self {
         let is = |code: &str| messages.iter().any(|message| message.code == code);
         let exit = if is("M170") {

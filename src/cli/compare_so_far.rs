@@ -119,8 +119,8 @@ impl SoFar {
         Message::error("M130", text)
     }
 
-    /// Writes the answer, and the requested files if anything was evaluated. `message` tells why
-    /// the answer is incomplete.
+    /// Writes the answer, and the requested files if anything was evaluated. `message` is the reason why the answer is
+    /// incomplete.
     fn show(mut self, common: &Common, message: Option<Message>) -> Result<(), Failure> {
         let done = self.done.iter().flat_map(|(pair, comparison)| rows(pair.as_ref(), comparison));
         let begun = self

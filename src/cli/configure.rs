@@ -129,7 +129,6 @@ impl Wanted {
         }
     }
 
-    /// Returns the message that `--require` names a function for which no objective is added.
     fn without_objective(&self, (function, attribute): (&str, &str), configurator: &Configurator) -> Message {
         let functions = configurator.functions();
         if !functions.iter().any(|existing| existing == function) {
@@ -204,8 +203,6 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     text
 }
 
-/// Formats the reasons why designs are ruled out or cannot be combined with the other choices, and
-/// the requirements that the chosen design misses.
 fn reasons(choice: &Choice) -> String {
     let mut text = String::new();
     for considered in &choice.considered {

@@ -81,8 +81,6 @@ fn explain_design(
     Ok(explanation.complete)
 }
 
-/// Explains which changes of the situation lead to another plan. Returns `true` if no limit was
-/// reached.
 fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<bool, Failure> {
     let changes = planning(common, limits, |hear| smallest_changes(mission, limits, hear))?;
     match common.format {
@@ -161,7 +159,6 @@ fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     }
 }
 
-/// Describes an alteration. `about` marks the bound as approximate.
 fn alteration_text(alteration: &Alteration, about: bool) -> String {
     let Alteration { name, from, to } = alteration;
     let now = from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();
@@ -193,9 +190,6 @@ fn why_text(why: &Availability) -> String {
     text
 }
 
-/// Formats the best plan, and the best plan with this design as the only one of its functions. If
-/// the best plan uses the design, the best plan without it follows. At the end are changes of the
-/// design's availability.
 fn design_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, .. } = found;
     let mut text = String::new();

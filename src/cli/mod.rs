@@ -153,8 +153,8 @@ pub fn main() -> ExitCode {
     ExitCode::from(exit as u8)
 }
 
-/// Runs the command, and writes a trace if requested. A trace that cannot be written is an error
-/// only if the command succeeds.
+/// Runs the command, and writes a trace if requested. A trace file that cannot be created prevents the command. A trace
+/// that cannot be completed is an error only if the command succeeds.
 fn traced(cli: &Cli) -> Result<Exit, Failure> {
     let trace = cli.common.trace.as_deref().map(Trace::begin).transpose()?;
     let outcome = run(cli);

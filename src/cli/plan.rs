@@ -275,7 +275,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(certified((arguments, common), exit(planned.solution.status), |directory| planned.certify(directory)))
 }
 
-/// Writes the certificate if one is requested. Returns `exit` if it is written, or if none is requested.
 fn certified(
     (arguments, common): (&Arguments, &Common),
     exit: Exit,
@@ -332,8 +331,6 @@ fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> Stri
     }
 }
 
-/// Returns the text below the verdict: statistics (with `--verbose`), values of objectives and
-/// makespan. Alternatives follow or, without alternatives, blocking designs and missing values.
 fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Arguments, &Common)) -> String {
     let statistics =
         if common.verbose { statistics_text(solution, &planned.preparation) } else { String::new() };
@@ -349,8 +346,6 @@ fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Ar
     statistics + &values + &makespan + &alternatives_text.or(blocking).unwrap_or_default()
 }
 
-/// Formats the answer in the requested format. Returns `None` if the format can express only a plan, and there is no
-/// plan.
 fn show(
     planned: &Planned<'_>,
     mission: &Mission,

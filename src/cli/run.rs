@@ -120,8 +120,6 @@ fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> 
     Ok(Exit::Done)
 }
 
-/// Prints the ready line, and then runs the loop on all events. Ends at the end of the input, or
-/// when the reader of the answers closes the pipe.
 fn drive(
     common: &Common,
     mut control: Loop,

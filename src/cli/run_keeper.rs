@@ -18,7 +18,6 @@ pub(super) struct KeeperSession<'a> {
     common: &'a Common,
     keeper: Keeper,
     journal: Option<Journal>,
-    /// Answers of the resumed journal, until they are printed.
     resumed_answers: Vec<KeeperAnswer>,
     outlet: &'a Outlet,
     clock: SystemClock,
@@ -85,7 +84,6 @@ impl<'a> KeeperSession<'a> {
         Ok(())
     }
 
-    /// Prints the answers of a resumed journal. Makes the first choice of designs if it was not made before.
     fn begin(&mut self) -> Result<Flow, Failure> {
         let read = Instant::now();
         let mut answers = std::mem::take(&mut self.resumed_answers);
@@ -143,7 +141,6 @@ impl<'a> KeeperSession<'a> {
         warn_if_unrecorded(self.common, of_loop);
     }
 
-    /// Handles a line. With a journal, records the line before it is handled.
     fn handle(
         &mut self,
         text: &str,

@@ -37,7 +37,6 @@ enum Source {
     Recorded(Box<Replay<Reader>>),
 }
 
-/// Opens a regular file or a pipe, and rejects anything else.
 fn regular(path: &Path) -> io::Result<File> {
     let kind = std::fs::metadata(path)?.file_type();
     #[cfg(unix)]

@@ -53,7 +53,6 @@ impl Outlets {
     }
 }
 
-/// Destinations of the loop's output. Copies share the destinations.
 #[derive(Debug, Clone)]
 pub(super) struct Outlet {
     recorder: Option<(Recorder, String)>,

@@ -4,7 +4,7 @@
 //! read. So the same lines give the same answers.
 //!
 //! If lines arrive from a pipe or a terminal, the loop reacts to all waiting lines before it
-//! deliberates. Only a line about an action that was not requested yet waits for the deliberation.
+//! deliberates. Only a line about an action or effect that was not requested yet waits for the deliberation.
 //! Plans are computed on another thread while the loop keeps reacting. A line that changes the
 //! planning problem cancels the search, but only a few times in a row.
 
@@ -28,8 +28,6 @@ pub(super) const MAX_WAITING: usize = 1024;
 
 pub(super) const MIN_PAUSE: Duration = Duration::from_millis(1);
 
-/// Input of a session: a line with the time at which it was read, plans from another thread, the end of the lines, or
-/// an error in reading them.
 pub(super) enum Input {
     Line(Line, Instant),
     Thoughts(Thoughts),
@@ -44,7 +42,6 @@ pub(super) enum Flow {
     Over,
 }
 
-/// A journal that is open for writing.
 pub(super) struct Resumed<A> {
     pub(super) journal: Journal,
     pub(super) recovery: Recovery,
@@ -57,7 +54,6 @@ pub(super) struct Session<'a> {
     common: &'a Common,
     control: Loop,
     journal: Option<Journal>,
-    /// Answers of the resumed journal, until they are printed.
     resumed_answers: Vec<Answer>,
     outlet: &'a Outlet,
     clock: SystemClock,
@@ -163,8 +159,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Prints the answers of a resumed journal. Makes the first decision, or the decision that the previous process
-    /// left open.
     fn begin(&mut self, read: Instant) -> Result<Flow, Failure> {
         let mut answers = std::mem::take(&mut self.resumed_answers);
         if self.control.has_agenda() {
@@ -298,8 +292,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Deliberates at once if no search is necessary, and otherwise starts a search on another
-    /// thread.
     fn deliberate(&mut self, sender: &SyncSender<Input>) -> Result<Flow, Failure> {
         if let Some(mut answers) = self.control.deliberate_at_once() {
             self.decided(&mut answers)?;

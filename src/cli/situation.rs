@@ -79,12 +79,10 @@ impl Situation {
         Self { knowledge, rules, imports, names, scenario, set, fail }
     }
 
-    /// Returns `true` if none of these options is used.
     pub(super) fn is_empty(&self) -> bool {
         !self.adds_knowledge() && self.before().is_none()
     }
 
-    /// Returns `true` if an option is used for which a mission's manifest has a key.
     fn adds_knowledge(&self) -> bool {
         let Self { knowledge, rules, imports, names, .. } = self;
         let Imports { catalog, directory, ignore_missing_imports } = imports;

@@ -124,7 +124,6 @@ fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure>
     Ok(Errors::unless_empty(mistakes)?)
 }
 
-/// Returns the error message of the command-line parser in one line, without the usage.
 fn refusal(error: &clap::Error) -> String {
     let text = error.to_string();
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
@@ -158,7 +157,6 @@ fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, 
     Ok(say(&SweepAnswer::new(&lines, 0..study.len(), &groups), &groups, common))
 }
 
-/// Writes the answer. Returns [`Exit::NotProved`] if runs are missing or have no answer.
 fn say(answer: &SweepAnswer, groups: &[Group], common: &Common) -> Exit {
     if common.format == Format::Json {
         output::json_answer(answer);

@@ -34,8 +34,6 @@ pub(super) fn time(text: &str) -> Result<BigRational, String> {
         .ok_or_else(|| format!("`{text}` is not a time such as 0.001"))
 }
 
-/// Converts a JSON number to an exact number. Returns `None` for other values, and for numbers that
-/// are too long.
 pub(super) fn decimal(value: &Value) -> Option<BigRational> {
     exact(&value.as_number()?.to_string())
 }

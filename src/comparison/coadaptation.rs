@@ -357,7 +357,6 @@ impl Coadaptation {
         (energy / BigRational::from(BigInt::from(unit))).ceil().to_integer().to_u32().unwrap_or(u32::MAX)
     }
 
-    /// Checks that all probabilities are from 0 to 1, and that no time or energy is negative (M122).
     pub(super) fn checked(self) -> Result<Self, Errors> {
         let (zero, one) = (BigRational::zero(), BigRational::one());
         let mut problems = Vec::new();
@@ -410,7 +409,6 @@ impl Coadaptation {
     }
 }
 
-/// Converts the battery's level or reserve to a number of levels (M122).
 fn battery_levels(name: &str, levels: &BigRational) -> Result<u32, Errors> {
     levels.to_integer().to_u32().ok_or_else(|| {
         let text = format!("`{name}` is {levels} battery levels; it must be between 0 and {}", u32::MAX);
@@ -523,7 +521,6 @@ fn words(atom: &Atom) -> (String, Vec<String>) {
     (atom.predicate.name.as_str().to_ascii_lowercase(), atom.arguments.iter().map(argument).collect())
 }
 
-/// Returns the last argument of the goal's first atom with the predicate `location`.
 fn goal(condition: &Condition, location: &str) -> Option<String> {
     match condition {
         Condition::Atom(atom) => {

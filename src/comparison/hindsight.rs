@@ -109,7 +109,7 @@ fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: u
     None
 }
 
-/// Returns `true` if the remaining plan never needs the lost component. `configuration` is the configuration before it.
+/// Returns `true` if the remaining plan never needs the lost component. `configuration` is the current configuration.
 fn carries_on(mission: &Coadaptation, configuration: usize, remaining_plan: &[Action]) -> bool {
     let mut configuration = configuration;
     remaining_plan.iter().all(|action| match action {

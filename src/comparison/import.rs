@@ -149,12 +149,10 @@ impl LegalConfiguration {
         components.chain(self.several.then(|| format!("{}_speed", self.speed.0))).collect()
     }
 
-    /// Ratio between the duration of a move at this speed and at full speed.
     fn slowness(self) -> f64 {
         SPEEDS[0].1 / self.speed.1
     }
 
-    /// Ratio between the energy of a move at this speed and at full speed.
     fn effort(self) -> f64 {
         self.slowness() * (self.design.1 + self.speed.2) / (self.design.1 + SPEEDS[0].2)
     }

@@ -1,9 +1,9 @@
 //! Parses the maps of Cámara et al. (JSON). Keeps the position in the text of names and measurements that may be
 //! faulty, for messages.
 //!
-//! A place has `node-id`, `connected-to` and `coords`. Maps of 2017, for the first robots of the Rainbow project,
-//! differ: they have `coord` instead, no measurements, and rectangles that the robot should avoid (`unsafe-rects`).
-//! No corridor crosses these rectangles.
+//! A place has `node-id`, `connected-to` and `coords`. Maps of 2017, for the first robots of the Rainbow project, have
+//! `coord` instead of `coords`, no measurements, and rectangles that the robot should avoid (`unsafe-rects`). No
+//! corridor crosses these rectangles.
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Deserializer, de};
@@ -172,7 +172,6 @@ pub(super) fn object(name: &str) -> String {
     safe.to_ascii_lowercase()
 }
 
-/// Returns line and column, both from 1, at which `part`, a slice of `text`, begins.
 fn place(text: &str, part: &str) -> (usize, usize) {
     let offset = (part.as_ptr() as usize).saturating_sub(text.as_ptr() as usize);
     let before = text.get(..offset).unwrap_or_default();

@@ -67,18 +67,14 @@ pub(super) fn flag(name: &str) -> Variable {
 struct ProcessWriter<'a> {
     mission: &'a Coadaptation,
     risk: Risk,
-    /// Names of the actions that change to each configuration.
     sets: Vec<String>,
-    /// Names of the moves along each arc.
     moves: Vec<String>,
 }
 
-/// Returns the names of the actions that change to each configuration.
 pub(super) fn names_of_changes(mission: &Coadaptation) -> Vec<String> {
     distinct(mission.configurations.iter().map(|configuration| format!("set_{}", configuration.name)))
 }
 
-/// Returns the names of the moves along each arc.
 pub(super) fn names_of_moves(mission: &Coadaptation) -> Vec<String> {
     let place = |place: usize| &mission.places[place];
     distinct(mission.arcs.iter().map(|arc| format!("go_{}_{}", place(arc.from), place(arc.to))))

@@ -107,7 +107,7 @@ pub fn shortest_routes(mission: &Coadaptation, max_routes: usize) -> Vec<Vec<usi
     routes
 }
 
-/// Returns the length of the shortest route from each place to the goal.
+/// Returns the length of the shortest route from each place to the goal; `None` if no route exists.
 fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<u64>> {
     let mut entering = vec![Vec::new(); mission.places.len()];
     for (number, arc) in mission.arcs.iter().enumerate() {

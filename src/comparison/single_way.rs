@@ -75,8 +75,6 @@ impl RouteWriter<'_> {
         variables
     }
 
-    /// Returns the assignment that subtracts an energy from the battery level, with 0 as the lower limit. Empty
-    /// without a battery, or for an energy of 0 levels.
     fn spent(&self, energy: &BigRational) -> Vec<(String, Expr, Place)> {
         if self.mission.battery.is_none() {
             return Vec::new();

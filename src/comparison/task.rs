@@ -152,7 +152,6 @@ struct Explorer<'a> {
     configurations: Vec<String>,
     arcs: BTreeMap<(usize, usize), BTreeMap<usize, Traversal>>,
     origins: Vec<Option<(usize, Act)>>,
-    /// For each place and each action that is executable there, the number of the next place and the configuration.
     moves: Vec<HashMap<Act, (usize, usize)>>,
 }
 

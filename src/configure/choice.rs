@@ -99,8 +99,8 @@ pub enum Verdict {
     RuledOut(Vec<String>),
     /// The design is not better than the chosen one: it misses more requirements, or equally many without more utility.
     Less,
-    /// The design is usable and preferred to the chosen one, if any, but conflicts with the choices for other
-    /// objectives, or a limit was reached before it was considered. The reason is a sentence.
+    /// The design is usable and preferred to the chosen one, if any, but conflicts with designs of other objectives, or
+    /// a limit was reached before it was considered. The reason is a sentence.
     Together(String),
 }
 
@@ -207,7 +207,6 @@ pub(super) fn choose(
 struct Offers<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
-    /// Components and estimations of each design, by the IRI of the design.
     designs: BTreeMap<String, (Vec<String>, BTreeMap<String, BigRational>)>,
 }
 
@@ -267,7 +266,6 @@ struct Whole<'a> {
     needing: &'a [Group],
     /// For each group, the index of the chosen design among the candidates; `None` if no design was chosen.
     designs: &'a [Option<usize>],
-    /// Designs of the objectives that are not in need. These objectives keep their designs.
     kept: &'a [&'a Offer],
     /// Remaining budgets after the demands of the kept designs; at least 0.
     left: &'a [BigRational],

@@ -110,7 +110,6 @@ pub struct Keeper {
     pub(super) statuses: BTreeMap<String, Vec<String>>,
     pub(super) violated: BTreeSet<String>,
     pub(super) fault: Option<Fault>,
-    /// Objectives for which no design could be chosen, each with the reasons reported last.
     pub(super) unserved: BTreeMap<String, Vec<String>>,
     pub(super) filters: Filters,
     pub(super) unrecorded: Unrecorded,
@@ -188,7 +187,7 @@ impl Keeper {
         self.numbers.missing()
     }
 
-    /// Returns the configurator, with the knowledge and the served objectives.
+    /// Returns the configurator, with the knowledge and the objectives.
     pub fn configurator(&self) -> &Configurator {
         &self.configurator
     }
@@ -367,7 +366,6 @@ impl Keeper {
         Ok(())
     }
 
-    /// Requests that the robot gives up the design of an objective.
     fn withdraw(
         &mut self,
         objective: &str,
@@ -376,7 +374,7 @@ impl Keeper {
         (because, optimal): (Vec<String>, bool),
     ) -> KeeperAnswer {
         self.effects += 1;
-        // A failure of an earlier change must not bring the design before it back.
+        // A failure of an earlier change must not restore an older design.
         for change in self.pending_changes.values_mut().filter(|change| change.objective == objective) {
             change.from = None;
         }
@@ -393,7 +391,6 @@ impl Keeper {
         self.request(objective, reconfigure)
     }
 
-    /// Reports new conclusions, then requests designs for the objectives in need, unless reasoning itself failed.
     fn adapt(&mut self, answers: &mut Vec<KeeperAnswer>) {
         self.infer(answers);
         let knowledge = self.configurator.knowledge();

@@ -163,7 +163,6 @@ fn change(record: &Value) -> Option<(u64, PendingChange)> {
     Some((record.get(0)?.as_u64()?, PendingChange { objective, from, to: text(record.get(3)?)? }))
 }
 
-/// Parses a requested change of design and its effect number. The record has the form of the answer `reconfigure`.
 fn service(record: &Value) -> Option<(u64, Service)> {
     let field = |name: &str| record.get(name).and_then(text);
     let effect = record.get("effect")?.as_u64()?;

@@ -39,8 +39,8 @@ pub struct Availability {
     pub functions: Vec<String>,
     /// `true` if the design is available.
     pub available: bool,
-    /// Rules and facts that rule the design out, and reasons why no plan could use it even if it
-    /// were available.
+    /// Rules and facts that rule the design out, and reasons why some actions could not use the design even if it were
+    /// available.
     pub because: Vec<String>,
     /// Failed components and measurements that contribute to ruling the design out.
     pub causes: Vec<Cause>,
@@ -53,11 +53,8 @@ pub struct Availability {
     pub unexamined: Vec<String>,
 }
 
-/// Sets of alterations that make a design available.
 struct Ways {
-    /// Minimal sets of alterations.
     sets: Vec<Vec<Alteration>>,
-    /// Alterations that were not examined, in words.
     unexamined: Vec<String>,
 }
 
@@ -139,7 +136,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         design: design.individual.name.clone(),
         functions: design.solves.iter().map(|function| function.name.clone()).collect(),
         available: design.available,
-        // Reasons why the design could not be used even if it were available.
+        // Reasons why some actions could not use the design even if it were available.
         because: against(mission, &design.individual.name),
         causes: Vec::new(),
         ways: Vec::new(),
@@ -303,7 +300,6 @@ pub(super) fn in_situation(
     best(&mission, limits)
 }
 
-/// Returns each alteration of the repairs once, with the best plan after this alteration alone.
 pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> Result<Vec<Change>, Errors> {
     let mut changes: Vec<Change> = Vec::new();
     for alteration in repairs.iter().flat_map(|repair| &repair.alterations) {
@@ -354,8 +350,8 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign, rules: &RuleBounds
     alterations
 }
 
-/// Adds alterations that concern all designs to `candidates_found`: recoveries of failed
-/// components, and changes of measurements. Failures are not added.
+/// Adds further alterations to `candidates_found`: the recovery of each failed component, and changes of measurements
+/// that concern any design. Failures are not added.
 fn all_candidates(
     knowledge: &Knowledge,
     mut candidates_found: Vec<Alteration>,
@@ -373,8 +369,6 @@ fn all_candidates(
     candidates_found
 }
 
-/// Returns the recovery of each failed component or, with `working`, the failure of each working
-/// component. `is_own` selects components by IRI.
 fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
     let components = knowledge.view().components().into_iter();
     let components = components.filter(|component| is_own(&component.individual.iri));

@@ -58,10 +58,6 @@ pub struct DesignExplanation {
     pub complete: bool,
 }
 
-/// Finds a design of the mission by its local name or IRI. Also returns all designs.
-///
-/// # Errors
-/// M112 if the design does not exist.
 fn find<'m>(mission: &'m Mission, name: &str) -> Result<(&'m FunctionDesign, &'m [FunctionDesign]), Errors> {
     let designs = mission.knowledge().map(|knowledge| knowledge.catalogue().designs()).unwrap_or_default();
     let named = designs.iter().find(|design| design.individual.name == name);

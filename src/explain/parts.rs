@@ -10,8 +10,8 @@ use crate::mapek::PlannedStep;
 pub struct BestPlan {
     /// The metric of the best plan, in its unit. `None` without a plan.
     pub cost: Option<BigRational>,
-    /// `true` if it is proved that no plan is cheaper or, without a cost, that there is no plan.
-    /// `false` if a limit was reached, or if reasoning failed.
+    /// `true` if it is proved that no plan is better or, without a cost, that there is no plan. `false` if a limit was
+    /// reached, or if reasoning failed.
     pub proved: bool,
     /// Steps of the plan; empty without a plan.
     pub steps: Vec<PlannedStep>,
@@ -84,8 +84,8 @@ impl Target {
     }
 }
 
-/// Distance of one millionth: between a strict bound and the value that is tried beyond it, and the error of bounds
-/// found by bisection.
+/// One millionth: the distance between a strict bound and the value that is tried beyond it, and the least error of
+/// bounds found by bisection.
 pub(super) fn little() -> BigRational {
     BigRational::new(1.into(), 1_000_000.into())
 }

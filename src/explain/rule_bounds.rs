@@ -18,7 +18,6 @@ use crate::knowledge::{Knowledge, VALUE_PROPERTIES, ValueRead};
 const BOUND: &[&str] = &["hasMinimum", "hasMaximum"];
 const AVAILABILITY: &[&str] = &["fd_realisability", "fd_available"];
 
-/// Result of [`rule_bounds`].
 #[derive(Debug, Clone, Default)]
 pub(super) struct RuleBounds {
     /// Comparisons of measured values with numbers.
@@ -27,7 +26,6 @@ pub(super) struct RuleBounds {
     pub unexamined: Vec<String>,
 }
 
-/// An alteration of a measured value that changes the outcome of a comparison in a rule.
 #[derive(Debug, Clone)]
 pub(super) struct RuleBound {
     pub alteration: Alteration,
@@ -46,7 +44,6 @@ impl RuleBound {
     }
 }
 
-/// Returns the bounds with which the rules of a knowledge base compare measured values.
 pub(super) fn rule_bounds(knowledge: &Knowledge) -> RuleBounds {
     let measurements = knowledge.view().measurements();
     let engine = knowledge.engine();
@@ -69,7 +66,6 @@ pub(super) fn rule_bounds(knowledge: &Knowledge) -> RuleBounds {
     RuleBounds { bounds, unexamined: unexamined.iter().map(words).collect() }
 }
 
-/// A rule with its reads of measured values.
 struct RuleReads<'a> {
     rule: &'a Rule,
     reads: &'a [ValueRead],
@@ -142,7 +138,6 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the variables of a rule whose values depend on measured values.
     fn dependent(&self, reads: &RuleReads<'_>, carriers: &BTreeSet<Symbol>) -> BTreeSet<Variable> {
         let mut dependent: BTreeSet<Variable> = reads.measured.keys().copied().collect();
         for atom in atoms(reads.rule) {
@@ -297,12 +292,10 @@ impl Reader<'_> {
     }
 }
 
-/// Returns `true` if one of the terms is one of the variables.
 fn contain(variables: &BTreeSet<Variable>, terms: &[Term]) -> bool {
     terms.iter().any(|term| term.as_variable().is_some_and(|variable| variables.contains(&variable)))
 }
 
-/// Returns the atoms in the body of a rule, and those in its aggregates.
 fn atoms(rule: &Rule) -> impl Iterator<Item = &Atom> {
     rule.body.iter().flat_map(|atom| std::iter::once(atom).chain(atom.parts()))
 }
@@ -330,7 +323,6 @@ fn is_comparison(built_in: BuiltIn) -> bool {
     )
 }
 
-/// Returns the outcome of a comparison of two values with this order.
 fn holds(built_in: BuiltIn, order: Ordering) -> bool {
     match built_in {
         BuiltIn::LessThan => order.is_lt(),

@@ -114,8 +114,6 @@ impl VariedMission<'_> {
         Ok(Some(best(&mission, self.limits)?).filter(|plan| plan.proved))
     }
 
-    /// Returns `true` if a plan has other actions or arguments than the current best plan, or if only one of
-    /// the two exists.
     fn is_other(&self, plan: &BestPlan) -> bool {
         let steps = |plan: &BestPlan| -> Vec<_> {
             plan.steps.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect()
@@ -248,8 +246,6 @@ fn shortest_decimal(low: &BigRational, high: &BigRational) -> BigRational {
     }
 }
 
-/// Returns the values of an attribute, above or below `from`, at which a requirement of a design
-/// begins or ceases to hold.
 fn required(mission: &Mission, attribute: &str, from: &BigRational, upwards: bool) -> Vec<Target> {
     let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
     let requirements = designs.flat_map(|design| &design.requirements);

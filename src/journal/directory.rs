@@ -22,7 +22,6 @@ pub(super) struct Segment {
     pub(super) digest: String,
     pub(super) before: Link,
     pub(super) after: Link,
-    /// Records of the segment before its first fault, without the header.
     pub(super) records: Vec<Record>,
     /// Number of bytes at the beginning of the file that contain the header and `records`.
     pub(super) sound: u64,
@@ -42,7 +41,6 @@ pub(super) enum End {
 }
 
 impl Segment {
-    /// Returns `true` if the segment ends with an `end` record, which refers to the next segment.
     pub(super) fn is_closed(&self) -> bool {
         self.records.last().is_some_and(|record| record.kind == "end")
     }

@@ -25,8 +25,8 @@ pub(super) struct Lock {
 }
 
 impl Lock {
-    /// Stores this process's number in the lock file, so that other processes can name it in their message. Returns
-    /// M322 if another process holds the lock.
+    /// Locks the journal, and stores the ID of this process in the lock file for the messages of other processes.
+    /// Returns M322 if another process holds the lock.
     pub(super) fn take(directory: &Path) -> Result<Self, Message> {
         let name = directory.join("lock");
         let failed = |error: &io::Error| broken(&name, &error.to_string());

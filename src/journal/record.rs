@@ -24,7 +24,6 @@ impl Link {
         Self { next: 0, digits: "0".repeat(DIGITS) }
     }
 
-    /// Formats the next record as a line. Also returns the link after it.
     pub(super) fn line(&self, kind: &str, fields: &[Value]) -> (String, Self) {
         let mut array = vec![json!(self.next), json!(kind)];
         array.extend_from_slice(fields);
@@ -47,7 +46,6 @@ impl Link {
 pub(super) struct Record {
     pub(super) number: u64,
     pub(super) kind: String,
-    /// Fields of the JSON array after number and kind.
     pub(super) fields: Vec<Value>,
 }
 

@@ -203,7 +203,6 @@ fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
     send(stream, &(head + &text))
 }
 
-/// Sends the event stream to a client until the run ends, the client disconnects, or the client is too slow.
 fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,
@@ -234,7 +233,6 @@ fn stanzas(lines: &[Arc<str>]) -> String {
     lines.iter().flat_map(|line| ["data: ", line, "\n\n"]).collect()
 }
 
-/// Sends a text. Fails if the connection does not accept the whole text within [`CLIENT_TIMEOUT`].
 fn send(stream: &mut TcpStream, text: &str) -> io::Result<()> {
     let begun = Instant::now();
     let mut remaining = text.as_bytes();

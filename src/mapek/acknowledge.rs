@@ -1,10 +1,11 @@
 //! Determines the believed design of each function from acknowledgements and failures of reconfigurations.
 //!
-//! The event `acknowledged` refers to a reconfiguration by its number. The function is then believed to have the design
-//! of its last acknowledged reconfiguration, until another design is observed or a failure is reported. If another
-//! design was observed while the reconfiguration was pending, the design is unknown. Messages can cross, be duplicated
-//! or arrive out of order: of two acknowledged reconfigurations of one function, the one requested later counts. A
-//! reconfiguration that a later one has superseded can still be acknowledged; until then its design is not believed.
+//! The event `acknowledged` refers to an effect by its number. After the acknowledgement of a reconfiguration, its
+//! function is believed to have the requested design, until another design is observed or a failure is reported. If
+//! another design was observed while the reconfiguration was pending, the design is unknown. Messages can cross, be
+//! duplicated or arrive out of order: of two acknowledged reconfigurations of one function, the one requested later
+//! counts. A reconfiguration that a later one has superseded can still be acknowledged; until then its design is not
+//! believed.
 //!
 //! A report that an action has started, progressed or succeeded implies that the request of the action has arrived.
 //! Some robots never acknowledge an effect by its number. For such a robot, the report also implies that the
@@ -18,7 +19,7 @@ use crate::mapek::receipts::{Acknowledged, Before};
 pub(super) enum Receipt {
     Unknown,
     Recorded,
-    /// The effect is acknowledged, but the design of the given function is uncertain.
+    /// The effect is acknowledged, but the current design of the given function is unknown.
     Doubtful(String),
 }
 

@@ -29,7 +29,7 @@ use crate::number;
 const MAX_FAILURES: u32 = 3;
 
 /// Minimum base of the pauses after searches without a proved outcome. The base is the time limit of a search if that
-/// is longer. The first pause is twice the base, and each further pause is twice the previous one.
+/// is longer. The first pause is twice the base. Each further pause is twice the previous one, at most [`MAX_RETRY`].
 const MIN_RETRY: Duration = Duration::from_secs(10);
 
 const MAX_RETRY: Duration = Duration::from_secs(3600);
@@ -37,7 +37,6 @@ const MAX_RETRY: Duration = Duration::from_secs(3600);
 /// Entry of `Beliefs::improvement_causes`, among the names of designs, that represents changed facts.
 const FACTS: &str = "facts";
 
-/// Reason for planning, which determines the condition under which the new plan is adopted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Need {
     /// The action under way could not continue unchanged. Other designs for it, or its suspension, were requested.
@@ -203,14 +202,14 @@ impl Adaptation<'_> {
 
     /// Searches for a plan for the reasons `because`, and adopts it unless it is the current plan. With
     /// [`Need::Better`], the plan is adopted only if its benefit is sufficient. With the other needs, the action under
-    /// way may be cancelled or suspended instead. Decides nothing if a plan is missing and the planner may not search
-    /// for it.
+    /// way may be cancelled or suspended instead. Decides nothing if a search is necessary and the planner may not
+    /// search.
     pub(super) fn replan(&mut self, because: Vec<String>, need: Need, answers: &mut Vec<Answer>) {
         let is_necessary = need != Need::Better;
         let reason = because.first().cloned().unwrap_or_default();
         answers.push(Answer::PlanRequested { because });
         self.beliefs.improvement_causes.clear();
-        // A search for another reason starts with the initial time limit.
+        // A search before the scheduled time has another reason, and starts with the initial time limit.
         let retry = self.beliefs.retry.take().filter(|scheduled| scheduled.at <= self.beliefs.now);
         let attempt = retry.map_or(0, |scheduled| scheduled.attempt);
         self.planner.attempt = attempt;
@@ -329,7 +328,6 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns `true` if `steps` are the current plan. Compares only actions and their arguments.
     fn is_current(&self, steps: &[PlannedStep]) -> bool {
         let key = |step: &PlannedStep| (step.action.clone(), step.arguments.clone());
         let Some(plan) = &self.beliefs.plan else { return false };
@@ -337,8 +335,6 @@ impl Adaptation<'_> {
         running.chain(plan).map(key).eq(steps.iter().map(key))
     }
 
-    /// Sets the durations and costs of the current plan, without the action under way, to those of `steps`, which are
-    /// the same plan in the present situation.
     fn update_costs(&mut self, steps: &[PlannedStep]) {
         let present = steps.iter().skip(usize::from(self.beliefs.running.is_some()));
         for (step, present) in self.beliefs.plan.iter_mut().flatten().zip(present) {
@@ -347,8 +343,8 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Returns the reason to keep the current plan, or `None` if the benefit of `outcome` is sufficient or the metric
-    /// of the current plan is undefined.
+    /// Returns the reason to keep the current plan. Returns `None` if the benefit of `outcome` is sufficient, or if a
+    /// metric value cannot be computed.
     fn insufficient_benefit(&self, outcome: &Outcome) -> Option<String> {
         let (current_metric, metric) = if self.beliefs.mission.problem().metric.is_some() {
             (self.beliefs.metric()?, outcome.cost.clone())

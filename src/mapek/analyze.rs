@@ -197,7 +197,6 @@ fn reasons(knowledge: &Knowledge, derivation: &Derivation) -> Vec<String> {
     lines
 }
 
-/// Formats a fact with local names in place of IRIs, e.g. `requiresC(fd_amcl_kinect, c_kinect)`.
 pub(crate) fn fact_text(fact: &Fact, symbols: &Symbols) -> String {
     let mut text = String::with_capacity(64);
     for (position, &symbol) in std::iter::once(&fact.predicate).chain(&fact.arguments).enumerate() {

@@ -222,7 +222,6 @@ pub enum Command {
 }
 
 impl Command {
-    /// Returns the value of the JSON field `answer`, such as `request_action`.
     fn kind(&self) -> &'static str {
         match self {
             Self::Reconfigure { .. } => "reconfigure",
@@ -353,7 +352,7 @@ impl Answer {
         }
     }
 
-    /// Returns the effect if the answer requests one, and `None` otherwise.
+    /// Returns the requested effect, or `None` for other answers.
     pub fn effect(&self) -> Option<&Effect> {
         match self {
             Self::Effect(effect) => Some(effect),

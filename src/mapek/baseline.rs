@@ -77,7 +77,7 @@ fn have_equal_records(left: &InitialElement, right: &InitialElement) -> bool {
     match (left, right) {
         (Fact(left), Fact(right)) | (NegatedFact(left), NegatedFact(right)) => have_equal_words(left, right),
         (Value(left, value, _), Value(right, other, _)) => {
-            // Records contain numerator and denominator as they are.
+            // Records contain unreduced fractions: equal numbers can have different records.
             value.numer() == other.numer() && value.denom() == other.denom() && have_equal_words(left, right)
         }
         _ => false,

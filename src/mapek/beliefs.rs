@@ -46,14 +46,11 @@ pub struct Beliefs {
     pub(super) improvement_causes: BTreeSet<String>,
     /// Time at which the last entry of `improvement_causes` was added, since the start of the mission.
     pub(super) improvement_since: Duration,
-    /// Number of requested actions, which is also the number of the last one.
     pub(super) actions: u64,
-    /// Number of created effects, which is also the number of the last one.
     pub(super) effects: u64,
     pub(super) outstanding: BTreeMap<u64, Effect>,
     pub(super) receipts: Receipts,
     pub(super) waits: BTreeMap<u64, Wait>,
-    /// Whether the robot has ever reported the start or the progress of an action.
     pub(super) reports_actions: bool,
     pub(super) lines: u64,
     pub(super) numbers: Numbers,
@@ -76,7 +73,6 @@ pub(super) struct Running {
     pub(super) suspended: bool,
     /// Whether the action is suspended only until planning has finished.
     pub(super) provisional: bool,
-    /// Number of the effect that requested the action.
     pub(super) request: u64,
     /// Time of the request or of the last report, since the start of the mission.
     pub(super) last_report: Duration,
@@ -183,8 +179,8 @@ impl Beliefs {
         &self.configuration
     }
 
-    /// Returns the function and the requested design of each reconfiguration that is outstanding: the robot has
-    /// reported neither its arrival nor its failure, and no later one has superseded it.
+    /// Returns the function and the requested design of each outstanding reconfiguration. A reconfiguration is not
+    /// outstanding after its acknowledgement, failure or deadline, or after a later one has superseded it.
     pub fn pending(&self) -> impl Iterator<Item = (&str, &str)> {
         self.outstanding.values().filter_map(|effect| match &effect.command {
             Command::Reconfigure { function, to, .. } => Some((function.as_str(), to.as_str())),
@@ -192,8 +188,8 @@ impl Beliefs {
         })
     }
 
-    /// Returns `true` if a reconfiguration of the function is outstanding, or was superseded without an answer. The
-    /// function's actual design may then differ from the believed one.
+    /// Returns `true` if a reconfiguration of the function is outstanding, or was superseded or given up without an
+    /// answer. The function's actual design may then differ from the believed one.
     pub fn is_unsettled(&self, function: &str) -> bool {
         self.pending().any(|(name, _)| name == function) || self.receipts.has_superseded(function)
     }

@@ -25,12 +25,11 @@ pub(super) struct Changes {
     pub(super) interruptions: Vec<String>,
     /// Reasons to plan, as sentences, that apply even if the current plan is valid.
     pub(super) reasons: Vec<String>,
-    /// Answers about filtered reports. The reaction has already returned those of a pending deliberation.
+    /// Answers about filtered reports, until the reaction returns them. A pending deliberation contains none of them.
     #[serde(skip)]
     pub(super) filtered: Vec<Answer>,
 }
 
-/// Extent of a change of the knowledge base.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(super) enum Base {
     #[default]
@@ -42,7 +41,6 @@ pub(super) enum Base {
 }
 
 impl Changes {
-    /// Returns `true` if the knowledge base or an input of planning has changed, or if there is a reason to plan.
     pub(super) fn any(&self) -> bool {
         self.base > Base::Nothing || self.facts || self.predicates || !self.reasons.is_empty()
     }

@@ -71,7 +71,6 @@ pub(crate) fn time_of_line(
     }
 }
 
-/// Pending deliberation.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 struct Agenda {
     changes: Changes,
@@ -99,9 +98,8 @@ pub struct Loop {
     pub(super) monitor: Monitor,
     pub(super) planner: Planner,
     agenda: Option<Agenda>,
-    /// Number of changes of the planning problem since the start, which identifies the current problem.
+    /// Number of reactions that may have changed the planning problem, which identifies the current problem.
     pub(super) question: u64,
-    /// Checksum of the initial mission and the settings.
     digest: String,
     /// Number of names and values that the knowledge base had in addition to those of its documents when it was last
     /// rebuilt; 0 before.
@@ -407,7 +405,6 @@ impl Loop {
         snapshot
     }
 
-    /// Returns the pending deliberation as JSON, or `null`.
     pub(super) fn agenda_record(&self) -> Value {
         serde_json::to_value(&self.agenda).unwrap_or_default()
     }
@@ -460,8 +457,6 @@ impl Loop {
         request(&mut self.beliefs, step, answers);
     }
 
-    /// Replaces the step of the action under way by `step`, and requests those of its designs that must be sent. Does
-    /// nothing without an action under way.
     pub(crate) fn reconfigure_now(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
         if let Some(mut running) = self.beliefs.running.take() {
             running.step = step;
@@ -470,7 +465,6 @@ impl Loop {
         }
     }
 
-    /// Returns `true` if no action is under way, no plan remains, and the goal is believed to hold.
     pub(crate) fn is_goal(&self) -> bool {
         self.beliefs.plan.is_none() && self.beliefs.running.is_none() && self.beliefs.violation().is_none()
     }

@@ -56,7 +56,6 @@ pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     effects.chain(action).min()
 }
 
-/// Returns `true` if the effect requests an action. The deadline of the action then applies to it.
 fn is_request(effect: &Effect) -> bool {
     matches!(effect.command, Command::Request { .. })
 }
@@ -190,8 +189,8 @@ fn next_deadline_after(running: &Running, settings: &Settings) -> Duration {
     allowed_silence(running, settings).saturating_mul(running.overdue.saturating_add(1))
 }
 
-/// Returns how long an action may be without reports before it is first overdue: `deadline_factor`
-/// times its expected duration, but at least `settings.deadline`.
+/// Time without reports after which an action is first overdue: `deadline_factor` times its expected duration, but at
+/// least `settings.deadline`.
 fn allowed_silence(running: &Running, settings: &Settings) -> Duration {
     let expected = number::to_f64(&running.step.duration) * settings.time_unit.seconds();
     let allowed_silence =

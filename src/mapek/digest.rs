@@ -12,7 +12,6 @@ pub(super) fn versioned(inputs: &str) -> String {
     checksum(&[env!("CARGO_PKG_VERSION").to_owned(), FORMAT.to_owned(), inputs.to_owned()])
 }
 
-/// Returns the checksum of name, facts, rules, domain, filled problem, bindings and settings.
 pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
     // A journal that can be resumed is complete. Therefore, the reaction to a failed write does not matter.
     let settings = settings.clone().with_unrecorded(Unrecorded::default());

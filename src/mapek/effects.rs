@@ -135,7 +135,6 @@ pub(super) fn cancel(beliefs: &mut Beliefs, running: Running, because: String, a
     beliefs.running = Some(Running { cancelling: true, ..running });
 }
 
-/// Drops the plan and pauses planning. Requests the suspension of the action under way unless it is suspended already.
 pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     beliefs.stuck = true;

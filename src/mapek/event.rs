@@ -1,7 +1,7 @@
 //! Events: reports of the managed system, one JSON object per line, in the format `metaplan-events/1`.
 //!
 //! Objects in the form of `diagnostic_msgs/DiagnosticArray`, as published by the MROS observers \[1\], are accepted,
-//! too. Other input is refused (see [`Refusal`]) and changes nothing.
+//! too. Other input is refused (see [`Refusal`]).
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
@@ -173,7 +173,6 @@ fn status_schema(_: &mut SchemaGenerator) -> Schema {
     })
 }
 
-/// JSON Schema of a decimal number, or a string that contains one.
 fn decimal_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({
         "anyOf": [
@@ -183,7 +182,6 @@ fn decimal_schema(_: &mut SchemaGenerator) -> Schema {
     })
 }
 
-/// JSON Schema of a number from 0 to 1, or a string that contains one.
 fn fraction_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({
         "anyOf": [
@@ -193,7 +191,6 @@ fn fraction_schema(_: &mut SchemaGenerator) -> Schema {
     })
 }
 
-/// JSON Schema of a field that must be present but may be null.
 fn name_or_null_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["string", "null"] })
 }
@@ -394,7 +391,6 @@ const KINDS: [&str; 17] = [
 
 const STATUSES: &str = "`FALSE` or `ERROR`, `RECOVERED`, `TRUE` or `OK`, or a truth value";
 
-/// Parses a status in the spelling of MROS or PLANTA, or a truth value.
 fn status(text: &str) -> Option<Status> {
     match text.to_ascii_uppercase().as_str() {
         "FALSE" | "ERROR" => Some(Status::Failed),
@@ -477,7 +473,6 @@ impl Event {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Returns the name of the event in the format, such as `component_status`.
     pub(crate) fn kind(&self) -> String {
         self.to_json().get("event").and_then(Value::as_str).unwrap_or_default().to_owned()
     }

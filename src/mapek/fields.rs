@@ -8,8 +8,8 @@ use serde_json::{Map, Value};
 
 use crate::number;
 
-/// Reason why an input line, or a part of the line, is rejected. Rejected input changes nothing, but a rejected line
-/// can advance the time, and then what is due by this time is handled.
+/// Reason why an input line, or a part of the line, is rejected. Rejected input has no effect of its own, but its line
+/// can advance the time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
     /// Stable code of the message.

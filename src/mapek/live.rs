@@ -29,8 +29,8 @@ pub(super) enum Live {
 }
 
 impl Live {
-    /// Plans incrementally. Returns a proved outcome, or the best plan at the time limit. Returns `None` if planning
-    /// from scratch is necessary.
+    /// Plans incrementally. Returns a proved outcome, or the best plan at the time limit. Returns `None` if the
+    /// incremental planner has no answer; the caller then plans from scratch.
     pub(super) fn plan(
         &mut self,
         question: &Question<'_>,

@@ -24,7 +24,6 @@ pub(crate) struct Memo(VecDeque<(StoredQuestion, Outcome)>);
 #[derive(Debug, Clone)]
 pub(crate) struct StoredQuestion {
     problem: Problem,
-    /// The text of the goal; `None` for the goal of the mission.
     goal: Option<String>,
     running: Option<Running>,
     /// The current plan, if the choice between optimal plans depends on it.
@@ -40,7 +39,6 @@ impl Memo {
         Some(outcome)
     }
 
-    /// Caches an outcome if it is proved.
     pub(super) fn store(&mut self, question: &Question<'_>, outcome: &Outcome) {
         if outcome.proved {
             self.0.push_front((StoredQuestion::new(question), outcome.clone()));

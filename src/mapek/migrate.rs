@@ -42,7 +42,7 @@ impl Loop {
         if let Some(base) = beliefs.mission.knowledge_mut() {
             let statements = former.mission.knowledge().map(Knowledge::statements).unwrap_or_default();
             base.restore_over(&statements)?;
-            // The rules of this version may have the conclusions that those of the former version lack.
+            // Applies the reports and objectives that are pending because reasoning failed in the former version.
             let waiting = former.mission.knowledge().map(Knowledge::waiting);
             base.take_over(waiting.cloned().unwrap_or_default());
         }

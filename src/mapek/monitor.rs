@@ -39,7 +39,6 @@ const PLANNED: [&str; 9] = [
 
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
-    /// IRIs and local names of the quality attributes of the knowledge base.
     pub(super) attributes: BTreeSet<String>,
     /// Attributes whose measured value cannot have an effect. Their measurements are refused.
     pub(super) unused_attributes: BTreeSet<String>,
@@ -136,7 +135,6 @@ impl BeliefUpdate<'_> {
         }
     }
 
-    /// Updates the knowledge base with a report about the individual `name`. `kind` is the noun for error messages.
     pub(super) fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
         let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
             let text = format!("without a knowledge base there is no {kind} `{name}`");
@@ -259,7 +257,6 @@ impl BeliefUpdate<'_> {
         running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))
     }
 
-    /// Records that an action has started. This also confirms that its request has arrived.
     fn confirm_started(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let request = self.running(action)?.request;
         self.beliefs.confirm_request(request);
@@ -312,7 +309,8 @@ impl BeliefUpdate<'_> {
 
     fn failed(&mut self, action: u64) -> Result<(), Refusal> {
         let step = self.ended_early(action)?.step;
-        // Only consecutive failures of one step count. Its duration and cost depend on the situation.
+        // Only consecutive failures of one step count. Steps are compared without duration and cost, which depend on
+        // the situation.
         let before = self.beliefs.failures.take().filter(|(failed, _)| failed.has_same_action(&step));
         let count = before.map_or(1, |(_, count)| count + 1);
         self.beliefs.failures = Some((step, count));
@@ -392,8 +390,8 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Sets a fact or a value of the problem. Returns `true` if this changes the believed state. If the result does
-    /// not fit the domain, restores the previous state and returns a refusal.
+    /// Sets a fact or a value of the problem. Returns `true` if this changes the believed state. If a fact or function
+    /// that was not checked before does not fit the domain, restores the previous state and returns a refusal.
     fn set(&mut self, name: &str, value: &str) -> Result<bool, Refusal> {
         let mission = &mut self.beliefs.mission;
         let key = if mission.is_function(name) { name.to_owned() } else { format!("{name} {value}") };

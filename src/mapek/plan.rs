@@ -24,7 +24,7 @@ const MAX_DOUBLINGS: u32 = 3;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Planner {
     pub time_limit: Option<Duration>,
-    /// Number of consecutive earlier searches without a proved outcome. Each doubles the time limit, up to
+    /// Number of earlier searches in the current series of scheduled repetitions. Each doubles the time limit, up to
     /// [`MAX_DOUBLINGS`] times.
     pub attempt: u32,
     /// Limits in addition to the time limit of one search.
@@ -63,8 +63,8 @@ impl Planner {
         outcome
     }
 
-    /// Removes and returns the next outcome computed by another thread. Returns `None` if there is none, or if the
-    /// outcome is about a different action under way. If the situation has changed, for example by progress of the
+    /// Removes and returns the next outcome computed by another thread. Returns `None` without a next outcome, or if
+    /// the outcome is about a different action under way. If the situation has changed, for example by progress of the
     /// action, the outcome no longer counts as proved.
     fn prepared(&mut self, question: &Question<'_>) -> Option<Outcome> {
         let (answered, mut outcome) = self.prepared.pop_front()?;

@@ -22,8 +22,6 @@ use crate::mapek::monitor::Changes;
 use crate::mapek::settings::{SafeReaction, Settings};
 use crate::mapek::step::PlannedStep;
 
-/// Reconfigures or suspends the action under way if it cannot continue unchanged. Adds the reason to the interruptions
-/// in `changes`.
 pub(super) fn react(
     beliefs: &mut Beliefs,
     settings: &Settings,

@@ -35,7 +35,6 @@ pub(super) struct Acknowledged {
     pub(super) effect: u64,
     pub(super) design: String,
     pub(super) before: Option<Before>,
-    /// Whether the reconfiguration was reported as failed after its acknowledgement.
     pub(super) failed: bool,
 }
 

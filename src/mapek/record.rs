@@ -70,7 +70,7 @@ pub(super) fn snapshot(beliefs: &Beliefs) -> Snapshot {
     Snapshot(Value::Object(fields))
 }
 
-/// Returns the fields of the snapshot except the facts (`init`), which can be large.
+/// Returns the fields of the snapshot except the pending deliberation and the facts (`init`), which can be large.
 pub(super) fn fields(beliefs: &Beliefs) -> Map<String, Value> {
     let statements = beliefs.mission.knowledge().map(Knowledge::statements).unwrap_or_default();
     let steps = |steps: &VecDeque<PlannedStep>| steps.iter().map(PlannedStep::to_record).collect::<Vec<_>>();

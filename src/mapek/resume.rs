@@ -9,8 +9,8 @@
 //! The copy may read a value that the progress of the action has already changed: in conditions, in the amounts of its
 //! effects, and in its duration. The action reads the value without these changes. Therefore, each such function `F`
 //! has a companion function `metaplan_done_F`, which contains the past change of each value, and the copy reads
-//! `F - metaplan_done_F`. Past increases at start are part of the values that conditions and effects at the end read.
-//! Therefore, the copy removes these increases from the companion at its start.
+//! `F - metaplan_done_F`. Past changes at start are part of the values that conditions and effects at the end read.
+//! Therefore, the copy removes these changes from the companion at its start.
 //!
 //! The past changes were made with the designs of the past. With other designs, the amounts may differ. A condition such
 //! as a sufficient battery level is then about the remaining share of the new amounts. Therefore, conditions read the
@@ -225,10 +225,8 @@ pub(super) fn has_reached_facts(domain: &Domain, step: &PlannedStep, problem: &P
     schemas(domain, step).any(|schema| reached_facts(schema, step, problem).is_some())
 }
 
-/// A ground atom.
 type GroundFact = (Name, Vec<Name>);
 
-/// Returns the atom with the arguments of a step.
 fn ground(atom: &Atom, schema: &Action, step: &PlannedStep) -> GroundFact {
     let value = |term: &Term| match term {
         Term::Variable(variable) => {
@@ -286,7 +284,6 @@ fn changed_predicates(effect: &Effect) -> BTreeSet<Name> {
     predicates
 }
 
-/// Removes the start conditions about facts that the action itself changes.
 fn waive_start_conditions(action: &mut Action, is_changed: impl Fn(&Atom) -> bool) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => waive(precondition, &is_changed),
@@ -298,7 +295,6 @@ fn waive_start_conditions(action: &mut Action, is_changed: impl Fn(&Atom) -> boo
     }
 }
 
-/// Removes the conjuncts that are literals of changed facts.
 fn waive(condition: &mut Condition, is_changed: &impl Fn(&Atom) -> bool) {
     let is_waived = match condition {
         Condition::And(parts) => {
@@ -316,7 +312,6 @@ fn waive(condition: &mut Condition, is_changed: &impl Fn(&Atom) -> bool) {
     }
 }
 
-/// Parameters of the compilation of a schema to its remainder.
 struct Shortening<'a> {
     progress: &'a BigRational,
     remaining_share: BigRational,
@@ -324,10 +319,9 @@ struct Shortening<'a> {
     /// which the end effects could violate start conditions.
     time_left: BigRational,
     gradual: &'a BTreeSet<Name>,
-    /// Functions with companions.
     restored: &'a BTreeSet<Name>,
-    /// Changed values, each with its change by the whole action minus the change, extrapolated to the whole action, that
-    /// the progress has made.
+    /// Changed values, each with the difference between its changes by the whole action: with the open designs, minus
+    /// with the past designs.
     differences: Vec<(Atom, Expression)>,
 }
 
@@ -338,7 +332,6 @@ impl<'a> Shortening<'a> {
         Self { progress, remaining_share, time_left, gradual, restored, differences: Vec::new() }
     }
 
-    /// Collects the differences between the changes with open designs and those that the progress has made.
     fn compare_designs(&mut self, schema: &Action, remainder: &Remainder<'_>) {
         let step = remainder.step;
         let context = step.context();
@@ -496,7 +489,6 @@ impl<'a> Shortening<'a> {
         }
     }
 
-    /// Subtracts the past changes from a value that the copy reads.
     fn restore(&self, leaf: &mut Expression) {
         if let Expression::Fluent(atom) = leaf
             && self.restored.contains(&atom.predicate.name)
@@ -586,7 +578,6 @@ fn done(function: &Name) -> Identifier {
     identifier(&format!("{DONE}{function}"))
 }
 
-/// Returns the companion of a function with the same arguments.
 fn done_atom(atom: &Atom) -> Atom {
     Atom { predicate: done(&atom.predicate.name), ..atom.clone() }
 }

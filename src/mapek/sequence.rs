@@ -86,7 +86,6 @@ impl Numbers {
         self.ranges.last_key_value().map(|(_, last)| *last)
     }
 
-    /// Returns the gaps between seen numbers, as inclusive ranges `[first, last]`.
     pub(crate) fn missing(&self) -> Vec<[u64; 2]> {
         let ends = self.ranges.values().map(|last| last + 1);
         let starts = self.ranges.keys().skip(1).map(|first| first - 1);

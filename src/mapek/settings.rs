@@ -203,7 +203,6 @@ impl Settings {
         Ok(settings)
     }
 
-    /// Returns an error M143 for each name in the filter settings that the knowledge base does not have.
     pub(crate) fn check(&self, knowledge: Option<&Knowledge>, origin: &ManifestPath) -> Result<(), Errors> {
         let mistakes = self.filters.mistakes(knowledge).into_iter().map(|(key, name, message)| {
             let path: [Key; 3] = ["adaptation".into(), key.into(), name.as_str().into()];
@@ -213,7 +212,6 @@ impl Settings {
         Errors::unless_empty(origin.quote(mistakes))
     }
 
-    /// Returns warnings, for `lint`, about settings with which noise causes reconfigurations or searches.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let mut doubts = self.filters.doubts(knowledge);
         if self.settle.is_zero() && knowledge.is_some() {

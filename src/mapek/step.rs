@@ -79,7 +79,6 @@ impl PlannedStep {
         }
     }
 
-    /// Returns `true` if the other step is the same action with the same arguments and designs.
     pub(crate) fn has_same_action(&self, other: &Self) -> bool {
         self.action == other.action
             && self.arguments == other.arguments

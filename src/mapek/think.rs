@@ -29,7 +29,6 @@ pub struct Thinker {
 pub struct Thoughts {
     question: u64,
     answers: Vec<(StoredQuestion, Outcome)>,
-    /// Whether planning was interrupted, so that the plans must not be used.
     is_stopped: bool,
 }
 
@@ -70,7 +69,6 @@ impl Drop for SearchHandle {
 #[derive(Debug, Default)]
 pub struct ParallelSearch {
     running: Option<SearchHandle>,
-    /// Number of consecutive cancelled searches.
     cancelled: u32,
 }
 
@@ -120,7 +118,7 @@ impl ParallelSearch {
         self.cancelled = 0;
     }
 
-    /// Interrupts the search. Its result must be ignored, which [`Self::end`] also says.
+    /// Interrupts the search. Its result must be ignored: [`Self::end`] then returns `true`.
     pub fn interrupt(&mut self) {
         self.running = None;
     }

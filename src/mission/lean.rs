@@ -55,8 +55,6 @@ mod tests {
     const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions) (:predicates (done ?x))
         (:durative-action work :parameters (?x) :duration (= ?duration 4) :effect (at end (done ?x))))";
 
-    /// Reduces a plan of simultaneous actions, one for each object in `work`. Checks that the
-    /// actions on the objects in `expected` remain. The goal needs actions on a and b.
     fn check(problem: &str, cost: i64, work: &[&str], expected: &[&str]) {
         let (domain, problem) = (Ok(Source::new("d", DOMAIN)), Ok(Source::new("p", problem)));
         let mission = Mission::new("", None, Bindings::default(), domain, problem);

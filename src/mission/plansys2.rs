@@ -62,7 +62,6 @@ pub fn plan_lines(plan: &Plan) -> Vec<PlanLine> {
     plan.steps.iter().map(line).collect()
 }
 
-/// Duration of an action in PlanSys2, in the domain's time unit; a duration of 0 becomes a thousandth.
 fn lasting(step: &Step) -> BigRational {
     if step.duration.is_zero() { instant() } else { step.duration.to_rational() }
 }

@@ -101,8 +101,6 @@ mod tests {
     use super::read_plan;
     use crate::setup::Setup;
 
-    /// Reads a plan with one step of the mission `uuv_plain`, given by the fields after the arguments. Returns the
-    /// arguments and the duration, or the message.
     fn read(fields: &str) -> Result<(Vec<String>, Option<BigRational>), String> {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/uuv_plain.toml");
         let mission = Setup::read(&manifest).expect("the mission is read").mission;

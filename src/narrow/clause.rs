@@ -24,7 +24,6 @@ pub(super) struct Clause {
 pub(super) enum Literal {
     /// An atom: predicate and arguments. Type tests are unary atoms, see [`of_type`].
     Holds(Name, Vec<Operand>),
-    /// An equality (`true`) or inequality (`false`) of two operands.
     Equal(bool, Operand, Operand),
 }
 

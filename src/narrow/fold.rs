@@ -15,7 +15,6 @@ use super::clause::{self, Clause, Fact, Literal, Operand};
 use super::possible::Possible;
 use super::settle::{Guards, settle};
 
-/// Settled predicates, which no action can change, with their clauses, and bounds for the other derived predicates.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Folded {
     settled: BTreeMap<Name, Vec<Clause>>,
@@ -105,8 +104,6 @@ fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut vocabulary: HashSet<N
     }
 }
 
-/// Computes the least fixpoint of clauses over the stated facts. Returns the derived facts that are
-/// not stated.
 fn fixpoint(
     clauses: &[&Clause],
     stated: &BTreeSet<Fact>,

@@ -90,7 +90,6 @@ fn classes<'c>(conditions: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(N
         match part {
             Condition::And(conjuncts) => parts.extend(conjuncts),
             Condition::Atom(atom) if !varying.contains(&atom.predicate.name) => {
-                // Only unary predicates are classes.
                 if let [argument] = &atom.arguments[..] {
                     found_classes.push((atom.predicate.name.clone(), argument));
                 }
@@ -136,8 +135,6 @@ fn is_bound(term: &Term, bound: &[&Name]) -> bool {
 /// or if the predicate may have a large extension).
 pub(super) type Parted = (BTreeMap<Name, Vec<Clause>>, BTreeMap<Name, Option<Vec<Clause>>>);
 
-/// Unfolds clauses until no further predicate becomes settled (see the head of this file). Returns the clauses of the
-/// settled and of the open predicates.
 pub(super) fn settle(
     mut clauses_by_head: BTreeMap<Name, Option<Vec<Clause>>>,
     changed: &BTreeSet<Name>,
@@ -239,7 +236,6 @@ impl Unfold<'_> {
         })
     }
 
-    /// Returns `true` if a clause derives the predicate `head` for all members of a class.
     fn holds_of_all(&self, class: &Name) -> bool {
         let is_inclusion = |clause: &Clause| match (&clause.body[..], &clause.arguments[..]) {
             ([Literal::Holds(name, operands)], [Operand::Variable(_)]) => {

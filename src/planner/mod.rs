@@ -229,8 +229,8 @@ impl<'m, 'r> Planner<'m, 'r> {
             let mut problem = self.problem.clone();
             let objective = objectives.parsed.first();
             problem.metric = objective.map(|objective| objective.metric.clone()).or(problem.metric);
-            // The removal of superfluous actions may take half of the extended time; the other half is for the
-            // validator.
+            // The removal of superfluous actions may take half of the extended time, because the validation of the
+            // plan follows.
             solution.plan = Some(lean(self.mission, &problem, plan, &reading, &limits.extended().half()));
         }
         let point = valued(solution, &objectives);
@@ -323,8 +323,6 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(Some(found))
     }
 
-    /// Executes the plan of `point` with the validator, and builds the result. `ground` is the
-    /// duration of grounding.
     fn planned(
         self,
         point: Point,
@@ -401,8 +399,6 @@ fn is_too_large(messages: &[Message]) -> bool {
     !messages.is_empty() && messages.iter().all(|message| message.code == "E304")
 }
 
-/// Adds to messages about numbers that are too large for integers which parts of the request prevent the use of exact
-/// rationals.
 fn unless_omitted(refused: Errors, unsupported: &[&str]) -> Errors {
     let unsupported = unsupported.join(" and ");
     let help =

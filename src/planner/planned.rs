@@ -16,9 +16,7 @@ use crate::report::{Positions, Seen, front_sheet, plan_picture};
 /// Ground task. Tasks of sequential plans are retained for certificates.
 #[derive(Debug)]
 pub(super) enum Ground {
-    /// Costs and values are integers.
     Integers(Task),
-    /// Costs and values are rationals of any size.
     Exact(ExactTask),
     /// Actions overlap. The metric's fluents in `not_minimised` were not minimised.
     Concurrent { not_minimised: Vec<String> },
@@ -98,7 +96,7 @@ impl Planned<'_> {
     /// amounts that depend on the state. The search does not minimise such fluents if an action may improve the metric,
     /// if it uses only the SAT solver, or if actions overlap.
     pub fn not_minimised(&self) -> Vec<String> {
-        // The search states a bound on the metric if it minimises the whole metric.
+        // The solution has a lower bound if the search minimises the whole metric.
         if self.solution.lower_bound.is_some() || self.solution.status != Status::Feasible {
             return Vec::new();
         }

@@ -51,7 +51,6 @@ impl<R> std::fmt::Debug for Replay<R> {
 enum State {
     Reading,
     Finished,
-    /// The file is truncated and was read up to its end.
     Unfinished,
 }
 

@@ -81,7 +81,7 @@ impl<W: Write + Seek> Recording<W> {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(format!("metaplan {} {}", env!("CARGO_PKG_VERSION"), mcap::LIBRARY_IDENTIFIER))
-            // Without compression, a truncated file can be read up to its last complete chunk.
+            // Uncompressed chunks need no decompressor in the reader.
             .compression(None)
             // Without seeking, a chunk is written as a whole.
             .disable_seeking(true);

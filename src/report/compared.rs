@@ -65,8 +65,6 @@ fn front(comparison: &Comparison) -> Points {
     }
 }
 
-/// Returns sentences about differences of penalised time between candidates, with the compared
-/// values as reasons, and about the loss of a component.
 fn prices(comparison: &Comparison) -> Vec<Change> {
     let leaf = |text: String| Reason { text, supports: Vec::new() };
     let price = |name: &str, value: Option<f64>, because: Vec<Reason>| Change {
@@ -161,7 +159,6 @@ fn accomplished(done: usize, all: usize) -> String {
     }
 }
 
-/// Returns a text for a strategy without accomplished missions. It is short enough for a small screen.
 fn none_accomplished(missions: usize) -> String {
     format!("0 of {missions} accomplished")
 }

@@ -106,8 +106,6 @@ fn inferred(answer: &Value) -> (Kind, String, Vec<Reason>) {
     (Kind::Inference, text.join("; "), reasons)
 }
 
-/// Formats an action with its arguments and designs. `name` is the field of `step` with the
-/// action's name.
 fn action(step: &Value, name: &str) -> String {
     let arguments = list(&step["arguments"]).iter().map(plain);
     let words: Vec<String> = std::iter::once(plain(&step[name])).chain(arguments).collect();

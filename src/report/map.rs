@@ -16,7 +16,6 @@ use planner::Plan;
 
 use crate::report::seen::Scene;
 
-/// An action that replaces the last argument of an atom.
 struct Movement<'d> {
     action: &'d Name,
     predicate: &'d Name,
@@ -82,7 +81,6 @@ fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d
     most_used.map(|(places, movements)| Moving { movements, places })
 }
 
-/// Returns the movements that the unconditional effects of an action describe.
 fn moves(action: &Action) -> Vec<Movement<'_>> {
     let (mut added, mut deleted) = (Vec::new(), Vec::new());
     let mut parts: Vec<&Effect> = match &action.body {
@@ -132,7 +130,6 @@ fn same_but_last(left: &Atom, right: &Atom) -> bool {
         && but_last(left) == but_last(right)
 }
 
-/// Returns the objects of a type and its subtypes, in the order of the files.
 fn objects(domain: &Domain, problem: &Problem, r#type: &TypeExpression) -> Vec<Name> {
     let object = Name::new("object");
     let mut below: BTreeSet<&Name> = names(r#type).collect();
@@ -155,7 +152,6 @@ fn objects(domain: &Domain, problem: &Problem, r#type: &TypeExpression) -> Vec<N
     entries.map(|entry| entry.identifier.name.clone()).filter(|name| visited.insert(name.clone())).collect()
 }
 
-/// Returns the last arguments of the atoms with these predicates: the places where something is.
 fn ends<'p>(atoms: impl Iterator<Item = &'p Atom>, predicates: &BTreeSet<&Name>) -> BTreeSet<Name> {
     let matching = atoms.filter(|atom| predicates.contains(&atom.predicate.name));
     matching.filter_map(|atom| atom.arguments.last()).map(|term| term.name().clone()).collect()

@@ -164,7 +164,6 @@ impl Checker<'_> {
         }
     }
 
-    /// Returns a numeric function in the validator's notation, or `None` after adding the mistakes.
     fn function(&mut self, path: &[Key], text: &str) -> Option<String> {
         match conditions::function(self.mission, text) {
             Ok(atom) => Some(written(&atom)),
@@ -226,8 +225,6 @@ impl Checker<'_> {
     }
 }
 
-/// Returns the last key of a path in quotes, for use in a message; the word "it" if the path ends
-/// with an index.
 fn last(path: &[Key]) -> String {
     match path.last() {
         Some(Key::Name(name)) => format!("`{name}`"),

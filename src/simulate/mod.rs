@@ -127,8 +127,7 @@ struct Stage {
     time_budget: f64,
     configuration: BTreeMap<String, String>,
     configurations: BTreeSet<BTreeMap<String, String>>,
-    /// Time at which the running action stalled, if the controller has not reacted since. Times are
-    /// in the domain's unit.
+    /// Time at which the running action stalled, in the domain's time unit, if the controller has not reacted since.
     stalled_since: Option<f64>,
     run: Run,
 }

@@ -146,7 +146,6 @@ impl Run {
     }
 }
 
-/// Formats a number with at most three decimals.
 pub(super) fn short(value: f64) -> String {
     let text = format!("{value:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

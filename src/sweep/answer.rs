@@ -88,7 +88,7 @@ impl SweepAnswer {
         }
     }
 
-    /// Adds the reasons why the command ended before all runs were done.
+    /// Sets the reasons why the command ended before all runs were done.
     #[must_use]
     pub fn because(self, messages: Vec<Message>) -> Self {
         Self { messages, ..self }

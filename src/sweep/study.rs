@@ -53,7 +53,6 @@ fn seeds() -> Vec<String> {
 }
 
 impl Sections {
-    /// Returns the keys in braces in the command and the generator. Other keys are options of the command.
     fn placeholders(&self) -> BTreeSet<&str> {
         let generator = self.generate.iter().flat_map(|generate| &generate.run);
         self.command.iter().chain(generator).flat_map(|word| placeholders(word)).collect()
@@ -142,9 +141,9 @@ pub struct Study {
     sections: Sections,
     /// Directory of the study's file, which is the working directory of the runs.
     pub directory: PathBuf,
-    /// Checksum of the study's command, generator, time limit and values, of the files whose paths are words of
-    /// the command, of all files of missions among them, and of the program's version. It does not cover the imports of
-    /// a knowledge base that the command names itself, nor files whose paths contain a placeholder.
+    /// Checksum of the study's command, generator, time limit and values, of the files whose paths are words of the
+    /// command, of all files of missions among them, and of the program's version. It does not cover the imports of a
+    /// knowledge base that the command names itself, the files of the generator, and files in `{dir}`.
     pub digest: String,
     /// Varied keys with their values. The value of the last key changes from each run to the next.
     keys: Vec<(String, Vec<Value>)>,
@@ -402,7 +401,6 @@ impl Study {
     }
 }
 
-/// Returns the names in braces, e.g. `key` for `{key}`, in a word of a command.
 fn placeholders(word: &str) -> impl Iterator<Item = &str> {
     word.split('{').skip(1).filter_map(|rest| rest.split_once('}').map(|(name, _)| name))
 }
@@ -465,8 +463,8 @@ fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
     Ok((0..count).map(|number| json!(pairs[number * pairs.len() / count])).collect())
 }
 
-/// Returns a word of the command with all values of its placeholders. Files in the directory of a run are not files
-/// of the study.
+/// Returns a word of the command for all values of its keys in braces. `{dir}` is not replaced, because files in the
+/// directory of a run are not files of the study.
 fn instances(word: &str, keys: &[(String, Vec<Value>)]) -> Vec<String> {
     let mut words = vec![word.to_owned()];
     for (key, values) in keys {

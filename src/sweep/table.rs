@@ -145,7 +145,6 @@ impl Table {
     }
 }
 
-/// Returns a number as it is, a truth value as 0 or 1, and `None` for other values.
 fn figure(value: &Value) -> Option<f64> {
     value.as_bool().map(|truth| f64::from(u8::from(truth))).or_else(|| value.as_f64())
 }

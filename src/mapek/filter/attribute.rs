@@ -89,11 +89,12 @@ pub(crate) struct AttributeFilter {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct AttributeState {
     believed: Option<BigRational>,
-    /// Last plausible sample; `None` after silence.
+    /// Last plausible sample; `None` before the first sample and after silence.
     plausible: Option<BigRational>,
     /// Last sample rejected as a jump; `None` after a plausible sample.
     suspect: Option<BigRational>,
-    /// Last plausible samples since the last confirmed crossing, oldest first.
+    /// Latest plausible samples, oldest first. Cleared by silence, and by a confirmed crossing if no other crossing is
+    /// pending.
     recent: VecDeque<BigRational>,
     /// Crossings of the bounds, in their order; `None` for a bound that the last sample has not crossed.
     crossings: Vec<Option<Crossing>>,
@@ -107,7 +108,6 @@ pub(crate) struct AttributeState {
 /// Latest samples without a gap that lie on the other side of a bound than the believed value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Crossing {
-    /// Time of the first of these samples.
     since: Micros,
     /// The one of these samples that is nearest to the believed value, after hysteresis.
     nearest: BigRational,
@@ -116,10 +116,7 @@ struct Crossing {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Hold {
     Range,
-    /// The sample is implausibly far from the last plausible sample, and from the last sample that was held for this
-    /// reason.
     Jump,
-    /// The sample satisfies a violated bound, but by less than the hysteresis.
     Hysteresis,
     /// Samples have crossed a bound for too short a time, or too few of them agree.
     Debounce,
@@ -284,7 +281,6 @@ impl AttributeFilter {
         Some(state.last_sample_time.unwrap_or(0).saturating_add(period).saturating_add(1))
     }
 
-    /// Returns the earliest time at which the crossing of a bound is confirmed without another sample.
     fn crossing_due(&self, state: &AttributeState) -> Option<Micros> {
         let crossings = self.bounds.iter().zip(&state.crossings);
         crossings.filter_map(|(bound, crossing)| self.confirmed_from(state, bound, crossing.as_ref()?)).min()
@@ -384,7 +380,8 @@ impl AttributeFilter {
     }
 }
 
-/// Compares two numbers. Faster than [`BigRational::cmp`], which divides, if all integers have 64 bits.
+/// Compares two numbers. Faster than [`BigRational::cmp`], which divides, if numerators and denominators fit into 64
+/// bits.
 pub(super) fn compare(left: &BigRational, right: &BigRational) -> Ordering {
     let parts = |number: &BigRational| Some((number.numer().to_i64()?, number.denom().to_i64()?));
     match (parts(left), parts(right)) {
@@ -404,12 +401,10 @@ impl Bound {
         }
     }
 
-    /// Returns `true` if exactly one of two values satisfies the bound.
     fn is_crossed(&self, believed: &BigRational, value: &BigRational) -> bool {
         self.keeps(believed) != self.keeps(value)
     }
 
-    /// Returns `true` if a value satisfies the bound by at least its band (hysteresis).
     pub(crate) fn keeps_clearly(&self, value: &BigRational) -> bool {
         match self.side {
             Side::Least => compare(value, &(&self.value + &self.band)).is_ge(),

@@ -5,7 +5,6 @@ use serde_json::{Value, json};
 
 use crate::mapek::filter::attribute::Micros;
 
-/// Filter of one component. The default accepts every report at once.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct ComponentFilter {
     /// Time for which all reports must be failures before a failure is believed.
@@ -25,7 +24,6 @@ pub(crate) struct ComponentState {
 }
 
 impl ComponentFilter {
-    /// Filters a reported status. Returns `true` if the status is believed from now on.
     pub(crate) fn report(&self, state: &mut ComponentState, now: Micros, status: Status) -> bool {
         let fails = status == Status::Failed;
         if state.has_failed.unwrap_or(false) == fails {

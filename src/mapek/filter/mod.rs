@@ -32,7 +32,6 @@ use crate::message::Message;
 use crate::number;
 
 impl FilterSettings {
-    /// Returns warnings, for `lint`, about settings with which noise causes reconfigurations.
     pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
         let filters = Filters::new(self, knowledge);
         let is_noisy = |(_, filter): &(&String, &AttributeFilter)| {
@@ -74,9 +73,7 @@ pub(crate) struct FilterStates {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Accepted {
-    /// Value of an attribute, by local name.
     Value(String, BigRational),
-    /// Status of a component, by local name.
     Status(String, Status),
     Unknown(String),
 }
@@ -122,7 +119,6 @@ impl Filters {
         }
     }
 
-    /// Returns `true` if there is a filter for the attribute, given by local name.
     pub(crate) fn has(&self, attribute: &str) -> bool {
         self.measured.contains_key(attribute)
     }
@@ -205,8 +201,6 @@ impl Filters {
         is_believed
     }
 
-    /// Returns the earliest time at which a filter changes a belief, or reports a silent sensor, without a further
-    /// report.
     pub(crate) fn due(&self, states: &FilterStates) -> Option<Duration> {
         let measured =
             self.measured.iter().filter_map(|(name, filter)| filter.due(states.measured.get(name)?));

@@ -14,7 +14,6 @@ use crate::mapek::filter::settings::{ComponentTimes, FilterSettings, MeasuredSet
 use crate::message::Message;
 use crate::number;
 
-/// An optional, unparsed number of a manifest, with its position in the file.
 type Number = Option<Spanned<toml::Value>>;
 
 pub(crate) type ComponentsSection = BTreeMap<String, ComponentSection>;

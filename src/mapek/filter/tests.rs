@@ -235,7 +235,6 @@ fn debounce_matches_its_definition_with_and_without_ticks() {
     }
 }
 
-/// A single outlier crosses no further bound than the samples that confirm the crossing.
 #[test]
 fn outliers_do_not_cross_further_bounds() {
     let bounds = [1250, 2250, 3250].map(|value| bound(value, Side::Least, 0)).to_vec();

@@ -51,7 +51,6 @@ pub struct MissingValue {
     /// Name of the file that should contain the value.
     pub file: String,
     pub(super) symbol: String,
-    /// `true` if the function has no value for any arguments, and no action assigns one.
     pub(super) is_silent: bool,
     pub(super) is_likely: bool,
 }
@@ -73,8 +72,8 @@ pub(super) struct Numbers<'m> {
     pub(super) domain: &'m Domain,
     problem: Problem,
     types: TypeHierarchy,
-    /// Predicates that are not static: actions, derived predicates, timed literals or the
-    /// availability of designs change them.
+    /// Predicates that are not static: actions or timed initial literals change them, axioms derive them, or they
+    /// express the availability of designs.
     dynamic: HashSet<Name>,
     changed: HashSet<Name>,
     assigned: HashSet<Name>,
@@ -176,7 +175,6 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Returns the attribute whose estimations are the values of a function of designs.
     fn attribute(&self, function: &Name) -> String {
         let mut bound = self.mission.bindings().written().iter();
         let bound = bound.find(|(symbol, _)| Name::new(symbol) == *function);

@@ -23,7 +23,6 @@ pub(super) fn bound_arguments(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<
     atom.arguments.iter().map(|term| object(term, binding).cloned()).collect()
 }
 
-/// Returns the arguments of an atom. `binding` must bind all its variables.
 pub(super) fn grounded(atom: &Atom, binding: &Binding<'_>) -> Vec<Name> {
     bound_arguments(atom, binding).unwrap_or_default()
 }
@@ -70,7 +69,6 @@ pub(super) fn walk<'a>(effect: &'a Effect, visit: &mut dyn FnMut(&'a Effect)) {
     }
 }
 
-/// Returns `true` if an effect of the action increases, decreases or scales the function.
 pub(super) fn grows(action: &Action, function: &Name) -> bool {
     let mut is_changed = false;
     for effect in effects(&action.body) {
@@ -100,7 +98,6 @@ pub(super) fn needed(action: &Action) -> Vec<&Atom> {
     functions
 }
 
-/// Collects the functions in comparisons that must hold for the condition to hold.
 pub(super) fn in_condition<'a>(condition: &'a Condition, needed: &mut Vec<&'a Atom>) {
     match condition {
         Condition::And(parts) => parts.iter().for_each(|part| in_condition(part, needed)),
