@@ -88,8 +88,8 @@ impl<'a> Lowering<'a> {
         self.store.relation(predicate, terms.len())
     }
 
-    /// Lowers a body atom; `guard` is the body atom that is the guard of an equality rule, if there is one. Returns `None`
-    /// for an aggregate.
+    /// Lowers a body atom. The atom `guard`, if there is one, becomes [`Comparison::Guard`]. Returns `None` for an
+    /// aggregate.
     fn condition(&mut self, atom: &Atom, guard: Option<&Atom>) -> Option<Condition> {
         let compare = |comparison, left: &Term, right: &Term| {
             Condition::Compare(comparison, (*left).into(), (*right).into())

@@ -1,9 +1,9 @@
-//! Compiles a rule into join plans: one plan for each body atom whose relation may change, one for each head
-//! atom, for rederivation, and one for the first evaluation. A plan is a list of steps.
+//! Compiles a rule into join plans: one plan for each relation, negation or aggregate in the body, one for each
+//! head atom, for rederivation, and one for the first evaluation. A plan is a list of steps.
 //!
-//! A plan starts from a row of one atom (its seed) and extends partial matches by one atom at a time. The
-//! order is greedy. Tests come as soon as their variables are bound, then the atom with the smallest expected
-//! number of matches.
+//! A plan starts from a row of one atom (its seed), or from the empty match, and extends partial matches by one
+//! atom at a time. The order is greedy. Tests come as soon as their variables are bound, then the atom with the
+//! smallest expected number of matches.
 
 use crate::aggregate::Function;
 use crate::builtin::BuiltIn;
@@ -37,8 +37,8 @@ impl Pattern {
 
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
-    /// Extends a match by the rows of a relation that fit `pattern`. `index` is the index on the columns of
-    /// `key`, which are in ascending order; without an index, all rows are visited. Ignores rows with a state
+    /// Extends a match by the rows that contain `key` in the columns of `index` and fit `pattern`. The key
+    /// is in ascending order of the columns; without an index, all rows are visited. Ignores rows with a state
     /// bit of `skip` and, if `is_link`, rows that the rule itself derived.
     Join {
         relation: RelationId,
@@ -61,7 +61,6 @@ pub(crate) enum Step {
         relation: RelationId,
         key: Vec<Source>,
     },
-    /// Tests that a built-in holds; if `negated`, that it does not hold. All arguments are bound.
     Test {
         built_in: BuiltIn,
         arguments: Vec<Source>,
@@ -109,8 +108,8 @@ pub(crate) enum Comparison {
     Different,
     /// Negation as failure of `Different`.
     NotDifferent,
-    /// Condition that the two names in the head of an equality rule are not equal yet. It only spares the rule
-    /// trivial conclusions, and is no premise of them. So fresh individuals satisfy it, unlike `Different`.
+    /// Condition that the two names in the head of an equality rule are not identical. It only avoids
+    /// trivial conclusions `sameAs(x, x)`. Unlike [`Self::Different`], it also holds for fresh individuals.
     Guard,
 }
 
@@ -160,7 +159,6 @@ pub(crate) struct Lowered {
 }
 
 impl Lowered {
-    /// Returns `true` if the rule requires that two names are not equal.
     pub fn compares_names(&self) -> bool {
         self.body.iter().any(|condition| matches!(condition, Condition::Compare(Comparison::NotSame, ..)))
     }
@@ -353,9 +351,8 @@ impl Planner<'_> {
                 let is_known = |column: &usize| bound.is_bound(sources[*column]);
                 let columns: Vec<usize> = (0..sources.len()).filter(is_known).collect();
                 let mask = columns.iter().fold(0, |mask, column| mask | 1 << column);
-                // Few rows of a transitive relation are links (rows that the rule itself did not derive). An
-                // index for links contains only these, because visiting all rows would take longer than
-                // deriving all conclusions.
+                // Few rows of a transitive relation are links (rows that the rule itself did not derive). An index
+                // for links omits the other rows, because visiting them would take most of the time.
                 let excluded_rule = is_link.then_some(self.number);
                 let index =
                     (mask != 0).then(|| self.store.get_mut(*relation).index_without(mask, excluded_rule));
