@@ -77,8 +77,8 @@ impl Granularity {
     }
 }
 
-/// Converts an argument to a moment: a date, a date with time, or the (possibly truncated) text of either.
-/// Returns `None` for other literals.
+/// Converts an argument to a moment: a date, a date with time, or the (possibly truncated) text of either. A truncated
+/// literal of these datatypes is ill-typed, but accepted. Returns `None` for other literals.
 fn moment(literal: &Literal) -> Option<Moment> {
     let text = match literal {
         Literal::Moment(moment) if moment.kind() != MomentKind::Time => return Some(moment.clone()),
@@ -173,7 +173,7 @@ impl Definition for AddFunction {
         true
     }
 
-    /// Returns an `xsd:date` for a date and a granularity of days or coarser, and an `xsd:dateTime`
+    /// Returns an `xsd:date` for an `xsd:date` and a granularity of days or coarser, and an `xsd:dateTime`
     /// otherwise.
     fn compute(&self, arguments: &[&Literal]) -> Option<Literal> {
         let [from, count, granularity] = arguments else { return None };
