@@ -114,7 +114,7 @@ pub enum Error {
     TooDeep {
         /// The document.
         file: String,
-        /// IRI that the expression describes, if found.
+        /// IRI of the subject of the nested statements, if found.
         about: Option<String>,
         /// Position of the nesting, or of an occurrence of the IRI `about`, if found.
         position: Option<Position>,
@@ -229,7 +229,7 @@ pub enum Warning {
     Unread {
         /// The statement or its subject.
         statement: String,
-        /// Cause of the warning.
+        /// Reason why the statement is not read.
         reason: String,
     },
     /// O203: a rule could not be read.
@@ -464,8 +464,6 @@ fn label_suffix(label: Option<&str>) -> String {
     label.map_or_else(String::new, |label| format!(" ({label})"))
 }
 
-/// Joins the values with commas. If there are more than `MAX_LISTED_VALUES` + 1 values, lists only the
-/// first `MAX_LISTED_VALUES` and the number of the others.
 fn abbreviated(values: &[String]) -> String {
     match values.get(..MAX_LISTED_VALUES).filter(|_| values.len() > MAX_LISTED_VALUES + 1) {
         Some(first) => format!("{} and {} more", first.join(", "), values.len() - MAX_LISTED_VALUES),

@@ -137,8 +137,8 @@ impl Resolver {
     }
 }
 
-/// Reads a catalog. Its `xml:base` is the directory of its entries; the library supports this attribute of groups
-/// only.
+/// Reads a catalog. Applies `xml:base` of the root element here, because the library supports this attribute only
+/// for groups.
 fn catalog(file: &Path) -> Result<horned_catalog::Catalog, Error> {
     let unusable = |reason: String| Error::Catalog { file: file.to_owned(), reason };
     let text = std::fs::read_to_string(file).map_err(|error| unusable(error.to_string()))?;
@@ -153,7 +153,7 @@ fn catalog(file: &Path) -> Result<horned_catalog::Catalog, Error> {
     catalog.map_err(|error| unusable(error.to_string()))
 }
 
-/// Characters that a path can contain, but the path of an IRI cannot.
+/// Characters that a path can contain, but the path of an IRI contains only in escaped form.
 const ENCODED: &AsciiSet = &CONTROLS
     .add(b' ')
     .add(b'"')

@@ -107,9 +107,8 @@ impl Runtime {
         Ok(net)
     }
 
-    /// Ends a cycle of the adaptation loop and returns the violated constraints. In latch mode without
-    /// violations, turns conclusions into assertions. The MROS reasoner does not adapt while there are
-    /// violations.
+    /// Ends a cycle of the adaptation loop and returns the violations. In latch mode without violations, turns
+    /// conclusions into assertions. The MROS reasoner does not adapt while there are violations.
     ///
     /// # Errors
     /// Returns the errors of [`Runtime::apply`].
