@@ -36,8 +36,8 @@ pub(super) struct Prover {
     pub(super) base: Engine,
     /// `base` for proofs from assumptions; see [`monotone`].
     pub(super) monotone: Engine,
-    /// Reason why the knowledge is inconsistent. `base` alone does not show that two names are equal which must differ
-    /// under the unique name assumption.
+    /// Reason why the knowledge is inconsistent. The original engine is examined, too, because `base` cannot violate
+    /// the unique name assumption.
     pub(super) inconsistency: Option<String>,
 }
 

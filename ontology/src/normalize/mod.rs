@@ -105,7 +105,7 @@ pub(crate) fn normalize(
         }
     }
     let mut warnings = Vec::new();
-    // The later passes are recursive, so expressions that are nested too deeply are rejected here.
+    // Later stages are recursive, so expressions that are nested too deeply are rejected here.
     if let Some((index, about)) = depth::too_deep(&graph) {
         // The document that contains the triple.
         let part = parts.partition_point(|(start, _)| *start <= index).saturating_sub(1);
