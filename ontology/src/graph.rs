@@ -112,8 +112,6 @@ impl Graph {
         }
     }
 
-    /// Adds the triples of an RDF list, and returns its head. `class` is the type of each list node, if the
-    /// nodes have one.
     pub(crate) fn add_list(&mut self, items: impl IntoIterator<Item = Term>, class: Option<&str>) -> Term {
         let nodes: Vec<_> = items.into_iter().map(|item| (self.fresh(), item)).collect();
         let nil = Term::from(NamedNode::new_unchecked(rdf::NIL));

@@ -138,7 +138,6 @@ impl Engine {
         named.into_iter().flatten().chain(rows)
     }
 
-    /// Returns the rows of the store that agree with a pattern, like [`Engine::matching`].
     pub(crate) fn matching_rows<'a>(
         &'a self,
         predicate: Symbol,

@@ -88,8 +88,6 @@ impl Engine {
         })
     }
 
-    /// Returns the ground relation atoms in the body of a recorded derivation: the negated atoms if
-    /// `negated`, otherwise the positive ones.
     pub(crate) fn body_facts(&self, record: Record, negated: bool) -> Vec<Fact> {
         let bound = self.records.get(record);
         self.body(record, negated)

@@ -69,7 +69,6 @@ pub(crate) struct Round<'a> {
     /// Number of variables per match, indexed by compiled rule.
     pub widths: &'a [usize],
     pub symbols: RefCell<&'a mut Arc<Symbols>>,
-    /// Rows from which plans start. A [`Start::Rows`] refers to a range of them.
     pub rows: &'a [Row],
     /// `true` while invalid derivations are searched: the plans then match all rows that held before the update. The
     /// store also contains newer rows.

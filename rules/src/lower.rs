@@ -17,7 +17,6 @@ use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 pub(crate) struct Lowering<'a> {
     symbols: &'a mut Symbols,
     store: &'a mut Store,
-    /// For each integrity constraint: the relation of its matches, and its position in the program.
     constraints: &'a mut Vec<(RelationId, usize)>,
     /// Relations without a name (matches of constraints and aggregates) that are in use.
     used: FxHashSet<RelationId>,
@@ -122,7 +121,6 @@ impl<'a> Lowering<'a> {
         Some(Template { relation: self.relation(predicate, &terms), arguments: sources(&terms) })
     }
 
-    /// Lowers an aggregate of a rule. `outer_conditions` contains the conditions already lowered.
     fn aggregate(
         &mut self,
         position: usize,

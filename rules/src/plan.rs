@@ -71,7 +71,6 @@ pub(crate) enum Step {
         result: u16,
         arguments: Vec<Source>,
     },
-    /// Enumerates the values of the unbound arguments of a built-in.
     Solve {
         built_in: BuiltIn,
         arguments: Vec<Source>,
@@ -125,8 +124,6 @@ impl Comparison {
     }
 }
 
-/// A join plan: the pattern of the start row (seed), and the steps to a complete match of the rule's
-/// body.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     /// Number of the compiled rule.
@@ -186,7 +183,6 @@ pub(crate) enum Condition {
     Not(RelationId, Vec<Source>),
     BuiltIn(BuiltIn, Vec<Source>),
     NotBuiltIn(BuiltIn, Vec<Source>),
-    /// Result of an aggregate over the rows of a relation that begin with the values of the group.
     Aggregate {
         matches: RelationId,
         function: Function,
@@ -209,7 +205,6 @@ impl Condition {
     }
 }
 
-/// Set of the bound variables: a flag for each variable number.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) struct Bound(pub Vec<bool>);
 
@@ -233,8 +228,6 @@ impl Bound {
         self.0[usize::from(number)] = true;
     }
 
-    /// Creates the pattern of the given columns: bound operands become checks, and unbound variables
-    /// become bound.
     fn pattern(&mut self, columns: impl Iterator<Item = (usize, Source)>) -> Pattern {
         let mut pattern = Pattern::default();
         let (known, unknown): (Vec<_>, Vec<_>) = columns.partition(|&(_, source)| self.is_bound(source));

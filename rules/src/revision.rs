@@ -96,8 +96,6 @@ impl Engine {
         Ok(net([switched, change]))
     }
 
-    /// Returns `true` if rules of an engine without equality have derived an `owl:sameAs` pair that is not
-    /// stated.
     fn derives_pairs(&mut self) -> bool {
         let same_as = self.symbols_mut().name(SAME_AS);
         let mut pairs = self.matching_rows(same_as, &[None, None]);

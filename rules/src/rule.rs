@@ -145,7 +145,6 @@ impl RuleIdentity {
         Self { source: source.into(), label: None, position }
     }
 
-    /// Returns the label with spaces in place of line breaks.
     pub(crate) fn label_line(&self) -> Option<String> {
         self.label.as_ref().map(|label| label.replace(['\n', '\r'], " "))
     }
@@ -213,7 +212,6 @@ impl Program {
         relations(self.rules.iter().flat_map(|rule| &rule.head), symbols)
     }
 
-    /// Returns the relations in rule bodies and within aggregates, with their numbers of arguments.
     pub(crate) fn queried(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
         let bodies = self.rules.iter().flat_map(|rule| &rule.body);
         relations(bodies.flat_map(|atom| std::iter::once(atom).chain(atom.parts())), symbols)

@@ -20,7 +20,6 @@ pub(crate) type Row = u32;
 const NO_ROW: Row = Row::MAX;
 
 pub(crate) mod state {
-    /// The row is unused.
     pub const FREE: u8 = 1;
     /// The row is in the delta of the current semi-naive round.
     pub const FRESH: u8 = 2;

@@ -72,7 +72,6 @@ fn names_differ(left: &str, right: &str) -> bool {
     }
 }
 
-/// Key of a name in the look-up table, which is searched by `str`.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 struct NameKey(Box<str>);
 

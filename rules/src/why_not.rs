@@ -267,8 +267,6 @@ impl Search<'_> {
         (0..state.open_conditions.len()).rev().max_by_key(|&at| score(state.open_conditions[at]))
     }
 
-    /// Visits the search nodes of a relation atom: one for each row that fits, and a last one in which
-    /// the fact is missing.
     fn branch(&mut self, state: &State, relation: RelationId, sources: &[Source]) {
         let Some(predicate) = self.engine.store.get(relation).predicate else { return };
         let arguments: Vec<Option<Symbol>> =

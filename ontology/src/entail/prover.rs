@@ -34,7 +34,6 @@ pub(super) fn contradiction(engine: &Engine) -> Option<String> {
 pub(super) struct Prover {
     /// In this engine, `owl:sameAs` is equality.
     pub(super) base: Engine,
-    /// `base` for proofs from assumptions; see [`monotone`].
     pub(super) monotone: Engine,
     /// Reason why the knowledge is inconsistent. The original engine is examined, too, because `base` cannot violate
     /// the unique name assumption.

@@ -6,7 +6,6 @@ use super::Builder;
 use crate::owl::{ANONYMOUS, Annotation, AnnotationValue, Iri};
 
 impl Builder {
-    /// Stores an axiom about an annotation property as an annotation of this property.
     pub(super) fn annotate_property(
         &mut self,
         property: &str,

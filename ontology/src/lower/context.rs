@@ -232,7 +232,6 @@ impl<'a> Context<'a> {
         self.rules.push(Rule { identity: identity.clone(), head, body, variables });
     }
 
-    /// Adds a rule of an auxiliary relation, which contains the members of `class`.
     pub(crate) fn auxiliary_rule(
         &mut self,
         class: &ClassExpression,

@@ -146,8 +146,6 @@ impl Context<'_> {
         (is_datatype && !self.is(EntityKind::Class, &iri)).then_some((DataRange::Datatype(iri), *value))
     }
 
-    /// Replaces the datatypes of the ontology in a rule body by tests. Returns alternative bodies, or the reason why the
-    /// rule cannot be used.
     fn with_ranges(&mut self, body: &[Atom]) -> Result<Vec<Conjunction>, &'static str> {
         let mut bodies = vec![Vec::new()];
         for atom in body {

@@ -211,8 +211,6 @@ fn has_values(graph: &Graph, list: &Term, datatypes: &FxHashSet<Term>) -> bool {
     false
 }
 
-/// Names the blank nodes in the lists of data unions and data intersections, and defines the names as the
-/// nodes.
 fn name_ranges(graph: &mut Graph) {
     let mut cells: Vec<usize> = Vec::new();
     for (_, node) in graph.instances(rdfs::DATATYPE) {

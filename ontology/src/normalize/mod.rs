@@ -45,7 +45,6 @@ pub(crate) struct Normal {
     /// Axioms and annotations that horned-owl does not have to read.
     pub plain: Parts,
     pub names: Names,
-    /// Origin of each rule. The canonical form of a rule has its index in this list as an annotation.
     pub rules: Vec<Origin>,
     pub warnings: Vec<Warning>,
 }

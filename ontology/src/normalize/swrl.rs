@@ -193,8 +193,6 @@ impl Pass {
         }
     }
 
-    /// Builds a property atom. It is a data atom if the stated type, the declaration of the property or
-    /// a literal as second argument requires this, and otherwise an object atom.
     fn property_atom(
         &mut self,
         property: Term,

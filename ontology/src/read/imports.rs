@@ -114,8 +114,6 @@ impl Resolver {
         self.catalogs.iter().find_map(|catalog| catalog.resolve(import))
     }
 
-    /// Returns the paths that the given catalogs, and the catalog next to the importing document, assign to an
-    /// import.
     fn targets(&self, import: &str, importer: Option<&Path>) -> Result<[Option<PathBuf>; 2], Error> {
         let given = self.given_target(import);
         let file = importer.and_then(Path::parent).map(|directory| directory.join(CATALOG));
@@ -171,7 +169,6 @@ const ENCODED: &AsciiSet = &CONTROLS
     .add(b'|')
     .add(b'}');
 
-/// Returns the `file:` IRI of an absolute path.
 pub(crate) fn iri_of_file(path: &Path) -> String {
     let path = path.to_string_lossy();
     // On Windows, canonical paths have the form `\\?\C:\kb\robot.ttl`; the IRI is `file:///C:/kb/robot.ttl`.

@@ -85,8 +85,6 @@ impl Runtime {
         Ok(derivations)
     }
 
-    /// Returns the facts with the values of a property of `subject` that count in the current
-    /// [`Mode`](super::Mode).
     fn property_facts(&self, subject: Symbol, property: Term) -> Vec<Fact> {
         let values = self.facts().objects(subject, property);
         let symbols = self.engine.symbols();

@@ -239,7 +239,6 @@ impl fmt::Display for Literal {
     }
 }
 
-/// Converts a float to the canonical form of XSD: `1.5E0`, `INF`, `NaN`.
 fn canonical_float<F: fmt::LowerExp>(value: F) -> String {
     let text = format!("{value:e}");
     match text.as_str() {

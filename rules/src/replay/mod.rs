@@ -222,8 +222,6 @@ impl Replayer<'_> {
         }
     }
 
-    /// Checks that all stated facts and all conclusions of rules are present, and that no integrity
-    /// constraint is violated. Returns the number of rule matches.
     fn closed(&mut self, stated: &[Fact]) -> Result<usize, Fault> {
         if let Some(fact) =
             stated.iter().find(|fact| !self.matcher.facts.contains(&self.matcher.names.normal(fact)))

@@ -105,7 +105,6 @@ fn moment(literal: &Literal) -> Option<Moment> {
     }
 }
 
-/// Returns `true` if the moments are comparable: all have a time zone, or none has.
 fn comparable(moments: &[Moment]) -> bool {
     moments.windows(2).all(|pair| pair[0].zone_text().is_empty() == pair[1].zone_text().is_empty())
 }
