@@ -235,9 +235,9 @@ pub enum Warning {
     /// O203: a rule could not be read.
     #[error("warning[O203]: rule <{ontology}>#{position}{} is left out: {reason}", label_suffix(label.as_deref()))]
     UnreadRule {
-        /// Ontology of the rule.
+        /// IRI of the ontology of the rule, or the name of a document or text without one.
         ontology: String,
-        /// Index of the rule in its ontology, from 0.
+        /// Index of the rule in its document, from 0.
         position: u32,
         /// Label of the rule.
         label: Option<String>,
@@ -252,9 +252,9 @@ pub enum Warning {
     UnknownArgument {
         /// The argument.
         iri: String,
-        /// Ontology of the rule.
+        /// IRI of the ontology of the rule, or the name of a document or text without one.
         ontology: String,
-        /// Index of the rule in its ontology, from 0.
+        /// Index of the rule in its document, from 0.
         position: u32,
     },
     /// O205: two documents declare one ontology IRI.
@@ -308,7 +308,7 @@ pub enum Warning {
     OutsideProfile {
         /// The axiom in functional-style syntax.
         axiom: String,
-        /// Whether a part of the axiom is used.
+        /// `true` if a part of the axiom is used, `false` if nothing of it is.
         partly: bool,
         /// The unsupported construct.
         reason: String,
@@ -316,9 +316,9 @@ pub enum Warning {
     /// O302: the engine rejects a rule.
     #[error("warning[O302]: rule <{ontology}>#{position}{} is left out: {reason}", label_suffix(label.as_deref()))]
     UnusableRule {
-        /// Ontology of the rule.
+        /// IRI of the ontology of the rule, or the name of a document or text without one.
         ontology: String,
-        /// Index of the rule in its ontology, from 0.
+        /// Index of the rule in its document, from 0.
         position: u32,
         /// Label of the rule.
         label: Option<String>,
@@ -329,9 +329,9 @@ pub enum Warning {
     #[error("warning[O303]: rule <{ontology}>#{position}{} has isRuleEnabled false; it is evaluated \
              nevertheless", label_suffix(label.as_deref()))]
     DisabledRule {
-        /// Ontology of the rule.
+        /// IRI of the ontology of the rule, or the name of a document or text without one.
         ontology: String,
-        /// Index of the rule in its ontology, from 0.
+        /// Index of the rule in its document, from 0.
         position: u32,
         /// Label of the rule.
         label: Option<String>,

@@ -50,6 +50,7 @@ impl Graph {
         self.triples.get(index).and_then(Option::as_ref)
     }
 
+    /// The index by subject keeps the subject with which the triple was added.
     pub(crate) fn get_mut(&mut self, index: usize) -> Option<&mut Triple> {
         self.triples.get_mut(index).and_then(Option::as_mut)
     }

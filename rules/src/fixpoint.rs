@@ -468,7 +468,7 @@ struct Lookup<'a> {
     index: Option<usize>,
     key: &'a [Source],
     pattern: &'a Pattern,
-    /// Whether rows that the rule itself derived are skipped; see [`crate::plan::Lowered::is_closure`].
+    /// `true` if rows that the rule itself derived are skipped; see [`crate::plan::Lowered::is_closure`].
     is_link: bool,
 }
 

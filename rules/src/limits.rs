@@ -76,7 +76,7 @@ pub(crate) struct Budget {
     limits: Limits,
     remaining_steps: Cell<u64>,
     rows_until_check: Cell<u64>,
-    /// Whether semi-naive rounds are running, in which rules may use their own conclusions.
+    /// `true` in semi-naive rounds, in which rules may use their own conclusions.
     pub recursive: Cell<bool>,
     stopped: Cell<Option<(Stop, u32)>>,
     value: RefCell<Option<Box<str>>>,

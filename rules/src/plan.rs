@@ -129,7 +129,7 @@ pub(crate) struct Plan {
     /// Number of the compiled rule.
     pub rule: u32,
     pub seed: Pattern,
-    /// Whether only links (rows that the rule itself did not derive) can be seeds, see
+    /// `true` if only links (rows that the rule itself did not derive) can be seeds, see
     /// [`Lowered::is_closure`].
     pub seed_is_link: bool,
     pub steps: Vec<Step>,
@@ -149,7 +149,7 @@ pub(crate) struct Lowered {
     pub width: usize,
     pub heads: Vec<Template>,
     pub body: Vec<Condition>,
-    /// Whether the rule states only that a relation is transitive: `r(?x, ?y) ^ r(?y, ?z) -> r(?x, ?z)`. Its second
+    /// `true` if the rule states only that a relation is transitive: `r(?x, ?y) ^ r(?y, ?z) -> r(?x, ?z)`. Its second
     /// atom is then matched only with *links*, i.e. rows that this rule did not derive. Every conclusion is a chain
     /// of links, and is found once for each possible last link instead of once for each name in the middle.
     pub is_closure: bool,

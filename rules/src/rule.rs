@@ -201,7 +201,7 @@ impl Rule {
 pub struct Program {
     /// Rules in any order.
     pub rules: Vec<Rule>,
-    /// Whether `owl:sameAs` is equality, see [`Program::with_equality`]: all names of an individual then
+    /// `true` if `owl:sameAs` is equality, see [`Program::with_equality`]: all names of an individual then
     /// share its facts. Otherwise `owl:sameAs` is an ordinary relation, and different names denote
     /// different individuals.
     pub equality: bool,

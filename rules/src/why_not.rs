@@ -86,7 +86,7 @@ pub enum Obstacle {
         left: Symbol,
         /// Second term.
         right: Symbol,
-        /// Whether the terms must be equal.
+        /// `true` if the terms must be equal, `false` if they must differ.
         wanted: bool,
     },
 }

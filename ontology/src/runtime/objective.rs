@@ -20,7 +20,7 @@ pub struct NewObjective<'a> {
     pub function: &'a str,
     /// Non-functional requirements: IRI or local name of an attribute type, and a bound in its unit.
     pub requirements: Vec<(&'a str, Literal)>,
-    /// Whether a better design is searched even while the objective has no problem.
+    /// `true` if a better design is searched even while the objective has no problem.
     pub always_improve: bool,
 }
 

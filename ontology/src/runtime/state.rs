@@ -22,9 +22,9 @@ pub struct Objective {
     /// Statuses that are stated or concluded (`UNGROUNDED`, `IN_ERROR_COMPONENT`, …); empty if there is no problem.
     /// Several statuses are a contradiction only if the knowledge base declares `o_status` functional.
     pub statuses: Vec<String>,
-    /// Whether a component has recovered, so that a better design may be available.
+    /// `true` if a component has recovered, so that a better design may be available.
     pub updatable: bool,
-    /// Whether a better design is searched even while the objective has no problem.
+    /// `true` if a better design is searched even while the objective has no problem.
     pub always_improve: bool,
     /// Designs in use for the objective.
     pub groundings: Vec<Grounding>,

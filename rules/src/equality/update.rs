@@ -32,7 +32,7 @@ struct Update<'e> {
     old_classes: FxHashMap<Symbol, Arc<[Symbol]>>,
     /// Facts that held before the update and may have ceased to hold. Not collected if `silent`.
     previous_facts: FxHashSet<Fact>,
-    /// Whether the update reports no changes (during the first evaluation).
+    /// `true` during the first evaluation, which reports no changes.
     silent: bool,
     pairs_to_join: Vec<Fact>,
     /// New rules, which the next [`Update::flush`] installs in the engine.

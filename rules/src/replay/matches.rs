@@ -38,7 +38,7 @@ pub(super) struct Matcher<'m> {
     pub facts: &'m Facts,
     pub names: &'m Names,
     pub equality: bool,
-    /// Whether a rule required two names to differ although names may be equal. The given facts alone
+    /// `true` if a rule required two names to differ although names may be equal. The given facts alone
     /// then do not determine the result.
     pub compares_names: bool,
     pub too_many: bool,

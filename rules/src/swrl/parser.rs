@@ -18,7 +18,7 @@ const LIBRARIES: [&str; 2] =
 /// Syntax options of rule texts.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Syntax {
-    /// Whether the extensions of SWRL, `not` and aggregates, are rejected.
+    /// If `true`, the extensions of SWRL (`not` and aggregates) are rejected.
     pub swrl_only: bool,
     /// Built-ins in addition to those of SWRL, see [`BuiltIn::custom`].
     pub built_ins: Vec<BuiltIn>,
