@@ -20,7 +20,6 @@ pub struct Position {
 }
 
 impl Position {
-    /// Converts a byte offset into `text` to a position. Offsets beyond the end give the end of the text.
     pub(crate) fn of_offset(file: &str, text: &[u8], offset: usize) -> Self {
         let before = &text[..offset.min(text.len())];
         let start = before.iter().rposition(|&byte| byte == b'\n').map_or(0, |index| index + 1);

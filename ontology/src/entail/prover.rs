@@ -136,7 +136,6 @@ fn is_key(rule: &Rule) -> bool {
     *rule.identity.source == *AXIOM_SOURCE && label.starts_with("HasKey(")
 }
 
-/// Returns a copy of the engine with assumed facts, and with the rules of [`monotone`].
 pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>) -> Result<Engine, Error> {
     let mut copy = monotone(engine)?;
     let insert = facts.into_iter().collect();

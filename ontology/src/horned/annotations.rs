@@ -17,7 +17,6 @@ impl Builder {
         self.annotate(subject, Annotation { property, value }, annotations);
     }
 
-    /// Adds an annotation of `subject`. `annotations` are annotations of `annotation` itself.
     pub(super) fn annotate(&mut self, subject: Iri, annotation: Annotation, annotations: Vec<Annotation>) {
         let nested = annotations.into_iter().map(|nested| (subject.clone(), annotation.clone(), nested));
         self.parts.annotation_annotations.extend(nested);
