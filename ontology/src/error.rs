@@ -20,7 +20,6 @@ pub struct Position {
 }
 
 impl Position {
-    /// Converts a byte offset into `text` to a position. Offsets beyond the end give the end of the text.
     pub(crate) fn of_offset(file: &str, text: &[u8], offset: usize) -> Self {
         let before = &text[..offset.min(text.len())];
         let start = before.iter().rposition(|&byte| byte == b'\n').map_or(0, |index| index + 1);
@@ -114,7 +113,7 @@ pub enum Error {
     TooDeep {
         /// The document.
         file: String,
-        /// IRI that the expression describes, if found.
+        /// IRI of the subject of the nested statements, if found.
         about: Option<String>,
         /// Position of the nesting, or of an occurrence of the IRI `about`, if found.
         position: Option<Position>,
@@ -229,15 +228,15 @@ pub enum Warning {
     Unread {
         /// The statement or its subject.
         statement: String,
-        /// Cause of the warning.
+        /// Reason why the statement is not read.
         reason: String,
     },
     /// O203: a rule could not be read.
     #[error("warning[O203]: rule <{ontology}>#{position}{} is left out: {reason}", label_suffix(label.as_deref()))]
     UnreadRule {
-        /// Ontology of the rule.
+        /// IRI of the ontology of the rule, or the name of a document or text without one.
         ontology: String,
-        /// Index of the rule in its ontology, from 0.
+        /// Index of the rule in its document, from 0.
         position: u32,
         /// Label of the rule.
         label: Option<String>,
@@ -252,9 +251,9 @@ pub enum Warning {
     UnknownArgument {
         /// The argument.
         iri: String,
-        /// Ontology of the rule.
+        /// IRI of the ontology of the rule, or the name of a document or text without one.
         ontology: String,
-        /// Index of the rule in its ontology, from 0.
+        /// Index of the rule in its document, from 0.
         position: u32,
     },
     /// O205: two documents declare one ontology IRI.
@@ -308,7 +307,7 @@ pub enum Warning {
     OutsideProfile {
         /// The axiom in functional-style syntax.
         axiom: String,
-        /// Whether a part of the axiom is used.
+        /// `true` if a part of the axiom is used, `false` if nothing of it is.
         partly: bool,
         /// The unsupported construct.
         reason: String,
@@ -316,9 +315,9 @@ pub enum Warning {
     /// O302: the engine rejects a rule.
     #[error("warning[O302]: rule <{ontology}>#{position}{} is left out: {reason}", label_suffix(label.as_deref()))]
     UnusableRule {
-        /// Ontology of the rule.
+        /// IRI of the ontology of the rule, or the name of a document or text without one.
         ontology: String,
-        /// Index of the rule in its ontology, from 0.
+        /// Index of the rule in its document, from 0.
         position: u32,
         /// Label of the rule.
         label: Option<String>,
@@ -329,9 +328,9 @@ pub enum Warning {
     #[error("warning[O303]: rule <{ontology}>#{position}{} has isRuleEnabled false; it is evaluated \
              nevertheless", label_suffix(label.as_deref()))]
     DisabledRule {
-        /// Ontology of the rule.
+        /// IRI of the ontology of the rule, or the name of a document or text without one.
         ontology: String,
-        /// Index of the rule in its ontology, from 0.
+        /// Index of the rule in its document, from 0.
         position: u32,
         /// Label of the rule.
         label: Option<String>,
@@ -464,8 +463,6 @@ fn label_suffix(label: Option<&str>) -> String {
     label.map_or_else(String::new, |label| format!(" ({label})"))
 }
 
-/// Joins the values with commas. If there are more than `MAX_LISTED_VALUES` + 1 values, lists only the
-/// first `MAX_LISTED_VALUES` and the number of the others.
 fn abbreviated(values: &[String]) -> String {
     match values.get(..MAX_LISTED_VALUES).filter(|_| values.len() > MAX_LISTED_VALUES + 1) {
         Some(first) => format!("{} and {} more", first.join(", "), values.len() - MAX_LISTED_VALUES),

@@ -22,7 +22,6 @@ fn calls<T: Display>(f: &mut Formatter<'_>, name: &str, arguments: &[T]) -> Resu
     call(f, name, &arguments)
 }
 
-/// Formats an IRI as `<iri>`, or as `_:label` for an anonymous individual.
 struct Angle<'a>(&'a Iri);
 
 impl Display for Angle<'_> {

@@ -50,6 +50,7 @@ impl Graph {
         self.triples.get(index).and_then(Option::as_ref)
     }
 
+    /// The index by subject keeps the subject with which the triple was added.
     pub(crate) fn get_mut(&mut self, index: usize) -> Option<&mut Triple> {
         self.triples.get_mut(index).and_then(Option::as_mut)
     }
@@ -112,8 +113,6 @@ impl Graph {
         }
     }
 
-    /// Adds the triples of an RDF list, and returns its head. `class` is the type of each list node, if the
-    /// nodes have one.
     pub(crate) fn add_list(&mut self, items: impl IntoIterator<Item = Term>, class: Option<&str>) -> Term {
         let nodes: Vec<_> = items.into_iter().map(|item| (self.fresh(), item)).collect();
         let nil = Term::from(NamedNode::new_unchecked(rdf::NIL));

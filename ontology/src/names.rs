@@ -75,7 +75,6 @@ impl Names {
         sorted.into_iter().zip(0..).map(|(iri, rank)| (iri.as_ptr(), rank)).collect()
     }
 
-    /// Converts a triple to its compact form. `blank` returns the number of a blank node.
     pub(crate) fn compact(
         &mut self,
         triple: Triple,

@@ -4,10 +4,11 @@
 //! [`Stated`] keeps the stated axioms and rules. [`lower_together`] translates them to facts and rules, once before
 //! and once after the change. The engine receives the differences between the two results.
 //!
-//! The translations are skipped if the change consists only of assertions about named individuals, classes and
-//! properties. They are needed nevertheless in the following cases. A rule derives members of `owl:Thing`, which
+//! The translations are skipped if the change consists only of assertions of named classes and properties about
+//! individuals. They are needed nevertheless in the following cases. A rule derives members of `owl:Thing`, which
 //! depend on all stated names. The change declares a class or property while the engine reasons about equality
-//! (`owl:sameAs`). An individual of the change is also declared as a class or property.
+//! (`owl:sameAs`). An individual of the change is also declared as a class or property. A class or property belongs
+//! to OWL's own vocabulary.
 //!
 //! Axioms form a set: an axiom of two documents is stated once, and one retraction removes it. Declarations are
 //! never retracted, because many documents repeat them.
@@ -400,8 +401,8 @@ fn with_arguments(atom: &Atom, map: &mut impl FnMut(&Argument) -> Argument) -> A
     }
 }
 
-/// Returns the axiom in a canonical form. The members of sets are sorted, and an assertion of an inverse
-/// property becomes an assertion of the property with swapped individuals.
+/// Returns the axiom in a canonical form. The members of sets are sorted, and a positive or negative assertion of
+/// an inverse property becomes an assertion of the property with swapped individuals.
 fn canonical(axiom: &Axiom) -> Axiom {
     fn ordered<T: Ord + Clone>(items: &[T]) -> Vec<T> {
         items.iter().cloned().collect::<BTreeSet<T>>().into_iter().collect()

@@ -8,7 +8,6 @@ use crate::read::syntax::Syntax;
 
 #[derive(Debug)]
 pub(crate) struct Document {
-    /// Path of the document, or the name given for a text.
     pub name: String,
     pub syntax: Syntax,
     pub iri: Option<Arc<str>>,

@@ -179,7 +179,6 @@ pub fn local_name(iri: &str) -> &str {
     if start < iri.len() { &iri[start..] } else { iri }
 }
 
-/// Returns `true` if an IRI belongs to the vocabularies of RDF, RDFS, OWL, SWRL or XML Schema.
 pub(crate) fn is_reserved(iri: &str) -> bool {
     [rdf::NS, rdfs::NS, owl::NS, swrl::NS, xsd::NS].iter().any(|ns| iri.starts_with(ns))
 }

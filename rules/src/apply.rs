@@ -51,7 +51,7 @@ impl Engine {
         Self::with_limits(symbols, program, facts, Limits::default())
     }
 
-    /// Checks rules without planning or evaluating them, which need not end within a budget.
+    /// Checks rules. Neither plans nor evaluates them, so that no budget is necessary.
     ///
     /// # Errors
     /// Returns the errors of all rules (R2xx, R302), of which R206 and R208 are reported only if there is no other
@@ -116,7 +116,7 @@ impl Engine {
     /// # Errors
     /// Returns R301 if the step budget is exhausted, R302 for an unknown symbol, R303 for a fact with too
     /// many arguments, and R304 if the evaluation was interrupted.
-    /// After an error, the engine is in its previous state.
+    /// After an error, the stated facts and all conclusions are the same as before.
     pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
         let span = info_span!("update", stated = delta.insert.len() + delta.delete.len(), changed = Empty);
         let _entered = span.enter();

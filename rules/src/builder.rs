@@ -96,7 +96,7 @@ impl EngineBuilder {
     /// Parses the rule texts, and creates an engine with all facts that follow.
     ///
     /// # Errors
-    /// Returns the errors of all texts (R101 to R105). If the texts have none, returns the errors of
+    /// Returns the errors of all texts (R101, R102, R104). If the texts have none, returns the errors of
     /// [`Engine::with_limits`].
     pub fn build(mut self) -> Result<Engine, Errors> {
         let mut errors: Vec<Error> = Vec::new();

@@ -83,7 +83,7 @@ pub enum Cause {
     Constraint(RuleIdentity),
     /// A literal whose lexical form is invalid for its datatype.
     IllTyped(Symbol),
-    /// A literal that is stated or derived to equal a different literal or an individual.
+    /// A literal that is stated or derived to equal an individual or a certainly different literal.
     Clash,
 }
 

@@ -91,7 +91,7 @@ impl Engine {
 
     /// Returns all facts that hold and are not stated, in the order of the engine's history: equal histories give
     /// equal orders. Of the equalities of an individual with more than `max_names` names, the result contains only
-    /// those with its first name; the other equalities follow from them.
+    /// the pairs of its first name with each other name; the other equalities follow from them.
     pub fn inferred_in_brief(&self, max_names: usize) -> Vec<Fact> {
         match &self.equality {
             Some(equality) => {
@@ -138,7 +138,6 @@ impl Engine {
         named.into_iter().flatten().chain(rows)
     }
 
-    /// Returns the rows of the store that agree with a pattern, like [`Engine::matching`].
     pub(crate) fn matching_rows<'a>(
         &'a self,
         predicate: Symbol,

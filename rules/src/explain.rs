@@ -48,9 +48,9 @@ impl Engine {
     }
 
     /// Returns all violations, sorted: the matches of integrity constraints (rules with an empty head), the facts
-    /// with ill-typed literals and, under equality, the `owl:sameAs` pairs of a literal with a different symbol. If
-    /// there are none, the rules find no contradiction in the facts. Under equality, a match binds individuals rather
-    /// than names, and its supports are stated facts where possible.
+    /// with ill-typed literals and, under equality, the `owl:sameAs` pairs of a literal with a name or a certainly
+    /// different literal. Under equality, a match binds individuals rather than names, and its supports are stated
+    /// facts where possible.
     pub fn violations(&self) -> Vec<Violation> {
         let mut violations = Vec::new();
         for &(relation, position) in &self.network.constraints {
@@ -88,8 +88,6 @@ impl Engine {
         })
     }
 
-    /// Returns the ground relation atoms in the body of a recorded derivation: the negated atoms if
-    /// `negated`, otherwise the positive ones.
     pub(crate) fn body_facts(&self, record: Record, negated: bool) -> Vec<Fact> {
         let bound = self.records.get(record);
         self.body(record, negated)

@@ -1,10 +1,9 @@
-//! Evaluates one semi-naive round: a fixed program of crepe (a Datalog compiler) interprets the join plans of the
-//! rules.
+//! Executes join plans of rules: a fixed program of crepe (a Datalog compiler) interprets their steps.
 //!
 //! A block is a list of matches of a rule's body. The tuples of the program contain only the numbers of blocks, so
-//! that crepe's bookkeeping costs nothing per match, and the store is never copied. `Match` holds blocks of partial
-//! matches, each with the number of plan steps that were executed; `Head` holds blocks of complete matches. A step
-//! extends a block by look-ups in the store, to which the program has a reference, and consumes the block.
+//! that crepe's bookkeeping costs nothing per match, and the store is never copied. `Match` holds blocks of matches,
+//! each with the number of plan steps that were executed; `Head` holds blocks of complete matches. A step consumes
+//! a block and returns a new block. It reads the store, to which the program has a reference.
 //!
 //! A small block passes several steps at once, because crepe's bookkeeping would take longer than the steps. In a
 //! typical update, each plan starts from one or two matches, which pass all steps before the program would start.
@@ -49,8 +48,7 @@ pub(crate) enum Start {
     },
 }
 
-/// Number of partial matches that one step may produce from a block before the rest of the block is
-/// deferred.
+/// Number of matches after which a join step defers the remaining matches of its input block.
 const BLOCK_MATCHES: usize = 1 << 16;
 
 /// Maximum number of partial matches in a small block. A small block executes several steps of the rule's join
@@ -71,10 +69,9 @@ pub(crate) struct Round<'a> {
     /// Number of variables per match, indexed by compiled rule.
     pub widths: &'a [usize],
     pub symbols: RefCell<&'a mut Arc<Symbols>>,
-    /// Rows from which plans start. A [`Start::Rows`] refers to a range of them.
     pub rows: &'a [Row],
-    /// Whether the plans match against the state before the update, to find invalid derivations. The
-    /// store holds a superset of that state.
+    /// `true` while invalid derivations are searched: the plans then match all rows that held before the update. The
+    /// store also contains newer rows.
     pub retracting: bool,
     pub budget: &'a Budget,
     pub blocks: RefCell<Vec<Vec<Symbol>>>,
@@ -219,7 +216,7 @@ impl Round<'_> {
 
     /// Stores a block that has reached `step` of its plan. Returns the step reached and the block number, or
     /// `None` if no match remains or the budget is exhausted. A small block first passes as many steps as
-    /// possible, since the program's bookkeeping would take longer than these steps.
+    /// possible.
     fn pass(&self, plan: PlanId, mut step: u32, mut block: Vec<Symbol>) -> Option<(u32, BlockId)> {
         let (steps, width) = (self.plans[plan as usize].steps.len(), self.width(&self.plans[plan as usize]));
         while (step as usize) < steps && !block.is_empty() && block.len() <= SMALL_MATCHES * width {
@@ -290,8 +287,8 @@ impl Round<'_> {
                 };
                 retain(block, width, |bound| find(relation, key, bound).is_some_and(fits))
             }
-            // The store holds a superset of the previous state. Superfluous matches do no harm, because
-            // `retract` compares them with the recorded derivations.
+            // The test could lose matches, because a row that was absent before the update may be in the store now.
+            // Superfluous matches do no harm: `retract` compares them with the recorded derivations.
             Step::Absent { .. } if self.retracting => block,
             Step::Absent { relation, key } => {
                 let relation = self.store.get(*relation);
@@ -334,7 +331,7 @@ impl Round<'_> {
     }
 
     /// Returns the state bits of the rows that a step skips: normally `skip`. While retracting, only unused
-    /// rows are skipped, because all rows that held before the update are visible then.
+    /// rows are skipped, because every row that held before the update must be visible.
     fn visibility(&self, skip: u8) -> u8 {
         if self.retracting { state::FREE } else { skip }
     }
@@ -427,7 +424,7 @@ impl Round<'_> {
     }
 
     /// Binds the variable `result` of each match to the value of `function`. Drops the matches for which the
-    /// function is undefined. Returns no match if the budget is exhausted.
+    /// function is undefined. Returns no match if the evaluation has to stop.
     fn compute(
         &self,
         mut block: Vec<Symbol>,
@@ -471,7 +468,7 @@ struct Lookup<'a> {
     index: Option<usize>,
     key: &'a [Source],
     pattern: &'a Pattern,
-    /// Whether rows that the rule itself derived are skipped; see [`crate::plan::Lowered::is_closure`].
+    /// `true` if rows that the rule itself derived are skipped; see [`crate::plan::Lowered::is_closure`].
     is_link: bool,
 }
 

@@ -51,8 +51,9 @@ pub use why_not::{NearMiss, Obstacle};
 pub use {num_rational::BigRational, smallvec::SmallVec};
 
 /// Status rules of the `TOMASys` metamodel as rule text. Every status is derived, so it is retracted
-/// when its cause no longer holds. All names are in `http://metacontrol.org/tomasys#`.
+/// when its cause no longer holds. Names are in `http://metacontrol.org/tomasys#` and `http://ros/mros#`.
 pub const TOMASYS_RULES: &str = include_str!("../swrl/tomasys.swrl");
 
-/// Rules for the availability of function designs, as rule text over `http://metacontrol.org/tomasys#`.
+/// Rules for the availability of function designs, and the errors of groundings and objectives, as rule text. The
+/// names are those of [`TOMASYS_RULES`].
 pub const COADAPTATION_RULES: &str = include_str!("../swrl/coadaptation.swrl");

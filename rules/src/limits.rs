@@ -33,7 +33,8 @@ const ROWS_PER_INTERRUPT_CHECK: u64 = 1 << 14;
 pub struct Limits {
     /// Number of steps that one update may take. Roughly, a step extends one partial match of a rule's body. A value
     /// that a recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8 bytes of its
-    /// digits or text. Other computed values cost a step for every 8 bytes. A value of more than 16 MiB exhausts the budget.
+    /// digits or text. Other new values cost a step for every 8 bytes. A new value of more than 16 MiB exhausts the
+    /// budget.
     pub steps: u64,
     /// Function that can stop an update. It is called after about every 16,000 visited rows and charged
     /// steps.
@@ -75,7 +76,7 @@ pub(crate) struct Budget {
     limits: Limits,
     remaining_steps: Cell<u64>,
     rows_until_check: Cell<u64>,
-    /// Whether semi-naive rounds are running, in which rules may use their own conclusions.
+    /// `true` in semi-naive rounds, in which rules may use their own conclusions.
     pub recursive: Cell<bool>,
     stopped: Cell<Option<(Stop, u32)>>,
     value: RefCell<Option<Box<str>>>,

@@ -17,7 +17,6 @@ use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 pub(crate) struct Lowering<'a> {
     symbols: &'a mut Symbols,
     store: &'a mut Store,
-    /// For each integrity constraint: the relation of its matches, and its position in the program.
     constraints: &'a mut Vec<(RelationId, usize)>,
     /// Relations without a name (matches of constraints and aggregates) that are in use.
     used: FxHashSet<RelationId>,
@@ -88,8 +87,8 @@ impl<'a> Lowering<'a> {
         self.store.relation(predicate, terms.len())
     }
 
-    /// Lowers a body atom; `guard` is the body atom that is the guard of an equality rule, if there is one. Returns `None`
-    /// for an aggregate.
+    /// Lowers a body atom. The atom `guard`, if there is one, becomes [`Comparison::Guard`]. Returns `None` for an
+    /// aggregate.
     fn condition(&mut self, atom: &Atom, guard: Option<&Atom>) -> Option<Condition> {
         let compare = |comparison, left: &Term, right: &Term| {
             Condition::Compare(comparison, (*left).into(), (*right).into())
@@ -122,7 +121,6 @@ impl<'a> Lowering<'a> {
         Some(Template { relation: self.relation(predicate, &terms), arguments: sources(&terms) })
     }
 
-    /// Lowers an aggregate of a rule. `outer_conditions` contains the conditions already lowered.
     fn aggregate(
         &mut self,
         position: usize,

@@ -92,8 +92,8 @@ pub(crate) struct Maintenance<'a> {
     pending: Rows,
     /// Indexed by stratum: `true` if a change affects the rules of the stratum.
     touched: Vec<bool>,
-    /// Union-find structure of the names whose equality was derived in this update. Of the derived
-    /// `owl:sameAs` pairs of a class, only the pairs of a spanning tree are stored.
+    /// Names connected by `owl:sameAs` pairs that this update has derived. A further pair of connected names is
+    /// not stored.
     joined: Forest,
     budget: Budget,
     buffers: Buffers,
@@ -322,8 +322,8 @@ impl<'a> Maintenance<'a> {
     }
 
     /// Starts from each row the plans that `plans` returns for its relation, in chunks of [`CHUNK`] starts.
-    /// The matches derive their heads; if `retracting`, they mark as doomed (over-deleted) the heads that
-    /// they support.
+    /// The matches derive their heads; if `retracting`, they mark the heads of which they are the recorded
+    /// derivation as doomed (over-deleted).
     fn run<'p>(
         &mut self,
         rows: &[(RelationId, Row)],
@@ -401,7 +401,7 @@ impl<'a> Maintenance<'a> {
     }
 
     /// Inserts or rederives the heads of complete matches, unless the heads already hold. Under equality,
-    /// skips an `owl:sameAs` pair whose names are identical or already connected in this update.
+    /// skips an `owl:sameAs` pair of identical names, or of names already connected in this update.
     fn conclude(&mut self, matches: &Matches) {
         let network = Arc::clone(&self.network);
         let number = network.plans[matches.plan as usize].rule;

@@ -27,7 +27,7 @@ pub(crate) struct Network {
     stratum_of: Vec<usize>,
     /// Relation of `owl:sameAs`, if it is interpreted as equality.
     pub same_as: Option<RelationId>,
-    /// Number of facts in the store when the plans were created.
+    /// Number of rows in the store when the plans were created.
     pub planned_for: usize,
     /// Indexed by relation: the strata whose rules read or derive the relation.
     pub readers: Vec<Vec<u32>>,
@@ -323,7 +323,7 @@ impl Network {
             }
         }
         self.plans = plans;
-        // Every rule has a plan for rederivation, so other strata have no rules.
+        // A stratum without plans for rederivation has no rules.
         strata.retain(|stratum| !stratum.rederive.is_empty());
         self.readers = vec![Vec::new(); self.stratum_of.len()];
         for (number, stratum) in strata.iter().enumerate() {
@@ -339,8 +339,6 @@ impl Network {
     }
 }
 
-/// Creates the plans of a rule: one per relation, negation or aggregate in the body, one per head, and one
-/// for the first evaluation.
 fn plan_rule(mut planner: Planner, plans: &mut Vec<Plan>, stratum: &mut Stratum) {
     let lowered = planner.lowered;
     let mut add = |plan: Option<Plan>| {

@@ -1,9 +1,9 @@
-//! Compiles a rule into join plans: one plan for each body atom whose relation may change, one for each head
-//! atom, for rederivation, and one for the first evaluation. A plan is a list of steps.
+//! Compiles a rule into join plans: one plan for each relation, negation or aggregate in the body, one for each
+//! head atom, for rederivation, and one for the first evaluation. A plan is a list of steps.
 //!
-//! A plan starts from a row of one atom (its seed) and extends partial matches by one atom at a time. The
-//! order is greedy. Tests come as soon as their variables are bound, then the atom with the smallest expected
-//! number of matches.
+//! A plan starts from a row of one atom (its seed), or from the empty match, and extends partial matches by one
+//! atom at a time. The order is greedy. Tests come as soon as their variables are bound, then the atom with the
+//! smallest expected number of matches.
 
 use crate::aggregate::Function;
 use crate::builtin::BuiltIn;
@@ -37,8 +37,8 @@ impl Pattern {
 
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
-    /// Extends a match by the rows of a relation that fit `pattern`. `index` is the index on the columns of
-    /// `key`, which are in ascending order; without an index, all rows are visited. Ignores rows with a state
+    /// Extends a match by the rows that contain `key` in the columns of `index` and fit `pattern`. The key
+    /// is in ascending order of the columns; without an index, all rows are visited. Ignores rows with a state
     /// bit of `skip` and, if `is_link`, rows that the rule itself derived.
     Join {
         relation: RelationId,
@@ -61,7 +61,6 @@ pub(crate) enum Step {
         relation: RelationId,
         key: Vec<Source>,
     },
-    /// Tests that a built-in holds; if `negated`, that it does not hold. All arguments are bound.
     Test {
         built_in: BuiltIn,
         arguments: Vec<Source>,
@@ -72,7 +71,6 @@ pub(crate) enum Step {
         result: u16,
         arguments: Vec<Source>,
     },
-    /// Enumerates the values of the unbound arguments of a built-in.
     Solve {
         built_in: BuiltIn,
         arguments: Vec<Source>,
@@ -109,8 +107,8 @@ pub(crate) enum Comparison {
     Different,
     /// Negation as failure of `Different`.
     NotDifferent,
-    /// Condition that the two names in the head of an equality rule are not equal yet. It only spares the rule
-    /// trivial conclusions, and is no premise of them. So fresh individuals satisfy it, unlike `Different`.
+    /// Condition that the two names in the head of an equality rule are not identical. It only avoids
+    /// trivial conclusions `sameAs(x, x)`. Unlike [`Self::Different`], it also holds for fresh individuals.
     Guard,
 }
 
@@ -126,14 +124,12 @@ impl Comparison {
     }
 }
 
-/// A join plan: the pattern of the start row (seed), and the steps to a complete match of the rule's
-/// body.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     /// Number of the compiled rule.
     pub rule: u32,
     pub seed: Pattern,
-    /// Whether only links (rows that the rule itself did not derive) can be seeds, see
+    /// `true` if only links (rows that the rule itself did not derive) can be seeds, see
     /// [`Lowered::is_closure`].
     pub seed_is_link: bool,
     pub steps: Vec<Step>,
@@ -153,14 +149,13 @@ pub(crate) struct Lowered {
     pub width: usize,
     pub heads: Vec<Template>,
     pub body: Vec<Condition>,
-    /// Whether the rule states only that a relation is transitive: `r(?x, ?y) ^ r(?y, ?z) -> r(?x, ?z)`. Its second
+    /// `true` if the rule states only that a relation is transitive: `r(?x, ?y) ^ r(?y, ?z) -> r(?x, ?z)`. Its second
     /// atom is then matched only with *links*, i.e. rows that this rule did not derive. Every conclusion is a chain
     /// of links, and is found once for each possible last link instead of once for each name in the middle.
     pub is_closure: bool,
 }
 
 impl Lowered {
-    /// Returns `true` if the rule requires that two names are not equal.
     pub fn compares_names(&self) -> bool {
         self.body.iter().any(|condition| matches!(condition, Condition::Compare(Comparison::NotSame, ..)))
     }
@@ -188,7 +183,6 @@ pub(crate) enum Condition {
     Not(RelationId, Vec<Source>),
     BuiltIn(BuiltIn, Vec<Source>),
     NotBuiltIn(BuiltIn, Vec<Source>),
-    /// Result of an aggregate over the rows of a relation that begin with the values of the group.
     Aggregate {
         matches: RelationId,
         function: Function,
@@ -211,7 +205,6 @@ impl Condition {
     }
 }
 
-/// Set of the bound variables: a flag for each variable number.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) struct Bound(pub Vec<bool>);
 
@@ -235,8 +228,6 @@ impl Bound {
         self.0[usize::from(number)] = true;
     }
 
-    /// Creates the pattern of the given columns: bound operands become checks, and unbound variables
-    /// become bound.
     fn pattern(&mut self, columns: impl Iterator<Item = (usize, Source)>) -> Pattern {
         let mut pattern = Pattern::default();
         let (known, unknown): (Vec<_>, Vec<_>) = columns.partition(|&(_, source)| self.is_bound(source));
@@ -353,9 +344,8 @@ impl Planner<'_> {
                 let is_known = |column: &usize| bound.is_bound(sources[*column]);
                 let columns: Vec<usize> = (0..sources.len()).filter(is_known).collect();
                 let mask = columns.iter().fold(0, |mask, column| mask | 1 << column);
-                // Few rows of a transitive relation are links (rows that the rule itself did not derive). An
-                // index for links contains only these, because visiting all rows would take longer than
-                // deriving all conclusions.
+                // Few rows of a transitive relation are links (rows that the rule itself did not derive). An index
+                // for links omits the other rows, because visiting them would take most of the time.
                 let excluded_rule = is_link.then_some(self.number);
                 let index =
                     (mask != 0).then(|| self.store.get_mut(*relation).index_without(mask, excluded_rule));

@@ -3,8 +3,9 @@
 //!
 //! Unchanged rules keep their recorded derivations. The conclusions of a removed rule lose their
 //! support, as if a fact of its body was deleted, and are rederived if another rule derives them. A new
-//! rule is evaluated once over all facts. All facts are derived again only if strata of unchanged rules
-//! split, if equality is switched off, or if [`Engine::set_program`] switches equality on.
+//! rule is evaluated once over all facts. Without an error, all facts are derived again only if the heads of an
+//! unchanged rule no longer lie in one stratum, if equality is switched off, or if [`Engine::set_program`] switches
+//! equality on.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -95,8 +96,6 @@ impl Engine {
         Ok(net([switched, change]))
     }
 
-    /// Returns `true` if rules of an engine without equality have derived an `owl:sameAs` pair that is not
-    /// stated.
     fn derives_pairs(&mut self) -> bool {
         let same_as = self.symbols_mut().name(SAME_AS);
         let mut pairs = self.matching_rows(same_as, &[None, None]);

@@ -42,7 +42,7 @@ pub enum Atom {
     BuiltIn {
         /// The built-in.
         built_in: BuiltIn,
-        /// The result comes first, as in `swrlb`.
+        /// The result, if any, comes first, as in `swrlb`.
         arguments: Vec<Term>,
     },
     /// The built-in does not hold: negation as failure, in bodies only. It thus also holds if an argument is of an
@@ -55,7 +55,7 @@ pub enum Atom {
     },
     /// `result` is the aggregate of all matches of a nested conjunction, in bodies only.
     ///
-    /// Variables that atoms outside the aggregate bind form the group: each group has its own value.
+    /// Variables of the nested conjunction that outer atoms bind, too, form the group: each group has its own value.
     /// Without such variables, all matches form one group. All other variables are local to the aggregate.
     Aggregate {
         /// The aggregate.
@@ -65,7 +65,7 @@ pub enum Atom {
         /// Conjunction without aggregates.
         body: Vec<Atom>,
     },
-    /// Both terms denote the same individual.
+    /// Both terms denote the same individual or value. In a head: concludes `owl:sameAs`.
     Same(Term, Term),
     /// In a body: the terms differ for certain. Names are unique by default, so any two different names differ;
     /// literals are compared by value. With [`Program::with_equality`](crate::Program::with_equality), the atom
@@ -145,7 +145,6 @@ impl RuleIdentity {
         Self { source: source.into(), label: None, position }
     }
 
-    /// Returns the label with spaces in place of line breaks.
     pub(crate) fn label_line(&self) -> Option<String> {
         self.label.as_ref().map(|label| label.replace(['\n', '\r'], " "))
     }
@@ -202,7 +201,7 @@ impl Rule {
 pub struct Program {
     /// Rules in any order.
     pub rules: Vec<Rule>,
-    /// Whether `owl:sameAs` is equality, see [`Program::with_equality`]: all names of an individual then
+    /// `true` if `owl:sameAs` is equality, see [`Program::with_equality`]: all names of an individual then
     /// share its facts. Otherwise `owl:sameAs` is an ordinary relation, and different names denote
     /// different individuals.
     pub equality: bool,
@@ -213,7 +212,6 @@ impl Program {
         relations(self.rules.iter().flat_map(|rule| &rule.head), symbols)
     }
 
-    /// Returns the relations in rule bodies and within aggregates, with their numbers of arguments.
     pub(crate) fn queried(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
         let bodies = self.rules.iter().flat_map(|rule| &rule.body);
         relations(bodies.flat_map(|atom| std::iter::once(atom).chain(atom.parts())), symbols)
@@ -266,7 +264,7 @@ impl Atom {
         }
     }
 
-    /// Returns `true` if the atom is negated as failure.
+    /// Returns `true` if the atom is a negation as failure.
     pub fn is_negated(&self) -> bool {
         matches!(
             self,

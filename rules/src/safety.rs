@@ -198,7 +198,7 @@ fn unbound(rule: &Rule) -> Vec<Error> {
         };
         let result_variables = variables(&atom.terms()[..1]);
         missing.extend(result_variables.into_iter().filter(|n| !is_bound(n)).map(|n| (false, n)));
-        // An aggregate without a scope needs the result of another aggregate, which has an error of its own.
+        // An aggregate without a scope needs the result of another aggregate. That result is unbound and is reported.
         let Some(scope) = scopes.iter().find(|scope| scope.position == position) else { continue };
         let mut inner = Bound(vec![false; bound.0.len()]);
         scope.group.iter().for_each(|&number| inner.bind(number));

@@ -8,7 +8,7 @@ use crate::symbol::Symbol;
 
 impl Round<'_> {
     /// Extends each match by the values of the unbound arguments for which the built-in holds. Returns
-    /// no match if the budget is exhausted.
+    /// no match if the evaluation has to stop.
     pub fn solve(
         &self,
         block: &[Symbol],

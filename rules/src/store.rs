@@ -2,7 +2,7 @@
 //!
 //! A relation holds the facts of one predicate and arity. A row is a number. Its arguments are contiguous in one
 //! vector, and its state is one byte. An index links the rows with equal key columns into a doubly linked list, so
-//! that insertion and deletion take O(indexes) time and allocate nothing per row.
+//! that insertion and deletion take expected time O(indexes) and allocate nothing per row.
 
 use hashbrown::HashTable;
 use rustc_hash::{FxBuildHasher, FxHashMap};
@@ -20,7 +20,6 @@ pub(crate) type Row = u32;
 const NO_ROW: Row = Row::MAX;
 
 pub(crate) mod state {
-    /// The row is unused.
     pub const FREE: u8 = 1;
     /// The row is in the delta of the current semi-naive round.
     pub const FRESH: u8 = 2;
@@ -101,7 +100,7 @@ impl Store {
         id
     }
 
-    /// Returns the number of stored facts, including the matches of constraints and aggregates.
+    /// Returns the number of stored rows in any state, including the matches of constraints and aggregates.
     pub fn len(&self) -> usize {
         self.relations.iter().map(|relation| relation.len()).sum()
     }
@@ -170,7 +169,7 @@ impl Relation {
         }
     }
 
-    /// Returns the number of stored facts in any state.
+    /// Returns the number of stored rows in any state.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
@@ -279,7 +278,6 @@ impl Relation {
         self.indexes.iter().any(|index| index.columns == columns && index.excluded_rule.is_none())
     }
 
-    /// Returns the number of the index on the columns of a bit mask. Builds the index on first use.
     pub fn index(&mut self, columns: u32) -> usize {
         self.index_without(columns, None)
     }

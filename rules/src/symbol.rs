@@ -59,7 +59,8 @@ impl fmt::Display for Value {
 /// Prefix of the names of fresh individuals.
 const FRESH: &str = "urn:metaplan:any:";
 
-/// Returns `true` if two different names certainly denote different individuals.
+/// Returns `true` if two different names denote different individuals under the unique name assumption. A fresh
+/// individual differs only from the others of its group.
 fn names_differ(left: &str, right: &str) -> bool {
     match (left.strip_prefix(FRESH), right.strip_prefix(FRESH)) {
         (None, None) => true,
@@ -71,7 +72,6 @@ fn names_differ(left: &str, right: &str) -> bool {
     }
 }
 
-/// Key of a name in the look-up table. It borrows as `str`, so that a look-up allocates nothing.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 struct NameKey(Box<str>);
 
@@ -126,7 +126,7 @@ impl Symbols {
     /// Returns the name or literal that a symbol denotes.
     ///
     /// # Panics
-    /// If the symbol belongs to another, longer interner.
+    /// If the interner has no symbol with this index.
     pub fn value(&self, symbol: Symbol) -> &Value {
         &self.values[symbol.index()]
     }
@@ -151,9 +151,9 @@ impl Symbols {
         self.values.is_empty()
     }
 
-    /// Returns `true` if two symbols certainly denote different things, under the unique name assumption. Returns
-    /// `false` for two literals whose difference is undecided, and for a fresh individual and any other that is not
-    /// assumed to differ from it; see [`Self::fresh_name`].
+    /// Returns `true` if two symbols certainly denote different things under the unique name assumption. Returns
+    /// `false` for two literals whose difference is undecided. A fresh individual differs only from literals and from
+    /// fresh individuals of its group; see [`Self::fresh_name`].
     pub(crate) fn differ(&self, left: Symbol, right: Symbol) -> bool {
         left != right
             && match (self.value(left), self.value(right)) {

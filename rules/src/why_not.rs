@@ -2,8 +2,8 @@
 //! to satisfying the body.
 //!
 //! A depth-first branch-and-bound search finds the binding with the lowest weight of unsatisfied atoms (a
-//! missing fact weighs more than a failed test). Ties are broken by the total gap of failed numeric
-//! comparisons. After a fixed number of nodes, the search ends as soon as it has a binding.
+//! missing fact weighs more than a failed test). Ties are broken by the total numeric gap of failed built-ins and
+//! aggregates. After a fixed number of nodes, the search ends as soon as it has a binding.
 
 use std::fmt;
 
@@ -69,7 +69,7 @@ pub enum Obstacle {
         /// Arguments of the built-in.
         arguments: Vec<Symbol>,
     },
-    /// An aggregate has another value than the required one, no value, or a value that occurs nowhere else.
+    /// An aggregate has another value than the required one, no value, or a value that the interner lacks.
     Aggregate {
         /// The aggregate.
         aggregate: Aggregate,
@@ -77,8 +77,7 @@ pub enum Obstacle {
         wanted: Option<Symbol>,
         /// Actual value; `None` if the aggregate has no value.
         found: Option<Literal>,
-        /// Exact absolute difference of the required and the actual number; `None` if one of them is not a
-        /// number.
+        /// Exact absolute difference of the required and the actual value; `None` unless both are numbers.
         gap: Option<BigRational>,
     },
     /// Two terms must differ, but are equal or not known to differ; or they must be equal, but differ.
@@ -87,7 +86,7 @@ pub enum Obstacle {
         left: Symbol,
         /// Second term.
         right: Symbol,
-        /// Whether the terms must be equal.
+        /// `true` if the terms must be equal, `false` if they must differ.
         wanted: bool,
     },
 }
@@ -155,8 +154,8 @@ impl fmt::Display for DisplayObstacle<'_> {
 
 impl Engine {
     /// Returns the nearest miss of each rule head that unifies with the fact: the binding of the rule body with the
-    /// lowest weight of unsatisfied atoms that a limited search finds. Empty if the fact holds, or if no rule could
-    /// derive it.
+    /// lowest weight of unsatisfied atoms that a limited search finds. Empty if the fact holds, or if no rule head
+    /// unifies with it.
     pub fn why_not(&self, fact: &Fact) -> Vec<NearMiss> {
         let relation = self.store.find(fact.predicate, fact.arguments.len());
         let Some(relation) = relation.filter(|_| !self.holds(fact)) else { return Vec::new() };
@@ -268,8 +267,6 @@ impl Search<'_> {
         (0..state.open_conditions.len()).rev().max_by_key(|&at| score(state.open_conditions[at]))
     }
 
-    /// Visits the search nodes of a relation atom: one for each row that fits, and a last one in which
-    /// the fact is missing.
     fn branch(&mut self, state: &State, relation: RelationId, sources: &[Source]) {
         let Some(predicate) = self.engine.store.get(relation).predicate else { return };
         let arguments: Vec<Option<Symbol>> =

@@ -2,11 +2,10 @@
 //! properties are looked up. Most other axioms are proved with *fresh individuals*, about which only the
 //! axiom's condition is assumed, or by *refutation*: the negation is assumed and contradicts the knowledge.
 //!
-//! The procedure is sound, because the rules are sound for the assumed individuals. Keys apply only to individuals with a
-//! name. Rules with a negation or an
-//! aggregate take no part in proofs from assumptions, no built-in holds of a fresh value, and fresh values and individuals
-//! differ only if this is assumed. The procedure is
-//! incomplete, because the rules are those of OWL 2 RL.
+//! The procedure is sound, because proofs use only rules that are sound for the assumed individuals. Keys apply only
+//! to individuals with a name, and rules with a negation or an aggregate take no part in proofs from assumptions. No
+//! built-in holds for a fresh value, except a data range that contains all values. Fresh values and individuals differ
+//! only if this is assumed. The procedure is incomplete, because the rules are those of OWL 2 RL.
 
 mod assume;
 mod axiom;
@@ -39,7 +38,7 @@ pub struct Entailment {
 
 /// Tries to prove every axiom of `conclusions`. Axioms with anonymous individuals, which are existential
 /// variables, are proved together as one conjunctive query. Rules and unread statements are reported as not
-/// entailed. For annotations see [`annotations`].
+/// proved. For annotations see [`annotations`].
 ///
 /// # Errors
 /// Returns an error if the evaluation of the rules exceeds its budget or is interrupted.
@@ -111,7 +110,7 @@ fn annotation_entailment(
     Entailment { statement: format!("AnnotationAssertion(<{property}> <{subject}> {value})"), answer }
 }
 
-/// Reports a statement of the conclusions as not entailed, if the warning states that it could not be read. Returns
+/// Reports a statement of the conclusions as not proved, if the warning states that it could not be read. Returns
 /// `None` for other warnings, and for an unused class expression, which claims nothing.
 fn unread(warning: &Warning) -> Option<Entailment> {
     let statement = match warning {

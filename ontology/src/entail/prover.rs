@@ -34,10 +34,9 @@ pub(super) fn contradiction(engine: &Engine) -> Option<String> {
 pub(super) struct Prover {
     /// In this engine, `owl:sameAs` is equality.
     pub(super) base: Engine,
-    /// `base` for proofs from assumptions; see [`monotone`].
     pub(super) monotone: Engine,
-    /// Reason why the knowledge is inconsistent. `base` alone does not show that two names are equal which must differ
-    /// under the unique name assumption.
+    /// Reason why the knowledge is inconsistent. The original engine is examined, too, because `base` cannot violate
+    /// the unique name assumption.
     pub(super) inconsistency: Option<String>,
 }
 
@@ -137,7 +136,6 @@ fn is_key(rule: &Rule) -> bool {
     *rule.identity.source == *AXIOM_SOURCE && label.starts_with("HasKey(")
 }
 
-/// Returns a copy of the engine with assumed facts, and with the rules of [`monotone`].
 pub(super) fn with_facts(engine: &Engine, facts: impl IntoIterator<Item = Fact>) -> Result<Engine, Error> {
     let mut copy = monotone(engine)?;
     let insert = facts.into_iter().collect();

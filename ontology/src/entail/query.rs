@@ -9,7 +9,7 @@ use crate::owl::{ANONYMOUS, Axiom, ClassExpression, Iri, ObjectPropertyExpressio
 
 const MAX_PARTIAL_ANSWERS: usize = 100_000;
 
-/// Partial answer of a query: maps anonymous individuals to named individuals.
+/// Partial answer of a query: maps anonymous individuals of the query to individuals of the knowledge base.
 type Assignment = BTreeMap<Iri, Iri>;
 
 impl Prover {

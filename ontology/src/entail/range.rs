@@ -31,7 +31,6 @@ impl Prover {
     }
 }
 
-/// Returns `true` if the intersection of the datatypes is certainly contained in the range.
 fn contains(datatypes: &[&str], range: &DataRange) -> bool {
     match range {
         DataRange::Datatype(iri) => is_subsumed(datatypes, iri),

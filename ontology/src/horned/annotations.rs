@@ -6,7 +6,6 @@ use super::Builder;
 use crate::owl::{ANONYMOUS, Annotation, AnnotationValue, Iri};
 
 impl Builder {
-    /// Stores an axiom about an annotation property as an annotation of this property.
     pub(super) fn annotate_property(
         &mut self,
         property: &str,
@@ -18,7 +17,6 @@ impl Builder {
         self.annotate(subject, Annotation { property, value }, annotations);
     }
 
-    /// Adds an annotation of `subject`. `annotations` are annotations of `annotation` itself.
     pub(super) fn annotate(&mut self, subject: Iri, annotation: Annotation, annotations: Vec<Annotation>) {
         let nested = annotations.into_iter().map(|nested| (subject.clone(), annotation.clone(), nested));
         self.parts.annotation_annotations.extend(nested);

@@ -16,8 +16,8 @@ use crate::vocab::owl;
 /// Result of lowering an axiom. The error is the reason why the axiom, or a part of it, has no rule form.
 type LoweringResult = Result<(), &'static str>;
 
-/// Adds the rules of the axioms, except assertions. Adds a warning for each axiom without a complete rule form and, if
-/// there are any, one summary warning.
+/// Adds the rules of the axioms, except assertions of named classes and properties, and datatype definitions. Adds a
+/// warning for each axiom without a complete rule form and, if there are any, one summary warning.
 pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
     let mut outside = 0;
     for (position, annotated) in axioms.iter().enumerate() {

@@ -255,7 +255,7 @@ pub(crate) fn conclusions(
 
 fn one_of(context: &mut Context, individuals: &[Iri], x: Term) -> Conclusions {
     match (context.equality, individuals) {
-        // As for functional properties, different names are not concluded to be equal.
+        // Different names are not concluded to be equal, as for functional properties.
         (Equality::UniqueNames, _) => {
             let differs = |individual: &Iri| Atom::Different(x, context.constant(individual));
             vec![(individuals.iter().map(differs).collect(), Vec::new())]
@@ -284,7 +284,7 @@ fn at_most_one(
     let bodies = cross(&bodies, &brief_condition(context, filler, z, variables));
     let equality = context.equality;
     let conclusion = |mut body: Conjunction| match equality {
-        // As for functional properties, different names are not concluded to be equal.
+        // Different names are not concluded to be equal, as for functional properties.
         Equality::UniqueNames => {
             body.push(Atom::Different(y, z));
             (body, Vec::new())

@@ -12,7 +12,7 @@ use crate::owl::{
 };
 use crate::vocab::{local_name, owl};
 
-/// Prefix of the IRIs of auxiliary relations, which are not part of the knowledge base.
+/// Prefix of generated IRIs. A relation with this prefix is auxiliary, i.e. not part of the knowledge base.
 pub const INTERNAL: &str = "urn:metaplan:";
 
 /// Source in the identity of a rule that is lowered from an axiom or from OWL's own vocabulary. The label of
@@ -186,7 +186,7 @@ impl<'a> Context<'a> {
     }
 
     /// Adds the rule `body → pair[0] owl:sameAs pair[1]`. Under the unique name assumption, adds the constraint that the
-    /// body does not hold for two different names.
+    /// body does not hold for two different names, or nothing if this is not checked.
     pub(crate) fn merge(
         &mut self,
         identity: &RuleIdentity,
@@ -232,7 +232,6 @@ impl<'a> Context<'a> {
         self.rules.push(Rule { identity: identity.clone(), head, body, variables });
     }
 
-    /// Adds a rule of an auxiliary relation, which contains the members of `class`.
     pub(crate) fn auxiliary_rule(
         &mut self,
         class: &ClassExpression,

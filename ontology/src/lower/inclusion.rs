@@ -17,8 +17,6 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use crate::owl::{Atom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression as Property, Ontology};
 use crate::vocab::owl;
 
-/// The existential and universal restrictions that get an auxiliary relation, with the inclusions
-/// between them.
 #[derive(Default)]
 pub(crate) struct Inclusions {
     /// Maps each restriction that an axiom concludes to the restrictions that include it and are
@@ -91,7 +89,6 @@ fn restriction(class: &ClassExpression, is_concluded: bool) -> Option<ClassExpre
 struct Uses {
     concluded: BTreeSet<ClassExpression>,
     conditions: HashSet<ClassExpression>,
-    /// Maps each restriction to the position of the first axiom or rule that contains it.
     positions: HashMap<ClassExpression, usize>,
     shared: HashSet<ClassExpression>,
     position: usize,

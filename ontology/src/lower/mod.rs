@@ -4,7 +4,7 @@
 //! A class is a unary relation and a property a binary one, both named by their IRI. The rules for axioms are
 //! the rules of the OWL 2 RL profile [1], instantiated with the classes and properties of each axiom. Thus the
 //! engine indexes by class and property instead of joining with a schema. `sameAs` and `differentFrom` are
-//! relations; functional and inverse functional properties conclude equality. An axiom that forbids something
+//! relations; functional and inverse functional object properties conclude equality. An axiom that forbids something
 //! becomes a rule with an empty head, an integrity constraint.
 //!
 //! Axioms outside of OWL 2 RL are lowered in part if possible (for example one direction of an equivalence),
@@ -127,7 +127,6 @@ impl Context<'_> {
         }
     }
 
-    /// Returns an error if a rule concludes that a value is in a datatype of the ontology.
     fn conclusion_of_range(&self, rule: &Rule) -> Result<(), &'static str> {
         let is_range = rule.head.iter().any(|atom| self.data_range_of(atom).is_some());
         if is_range { Err("a data range as a conclusion") } else { Ok(()) }
@@ -147,8 +146,6 @@ impl Context<'_> {
         (is_datatype && !self.is(EntityKind::Class, &iri)).then_some((DataRange::Datatype(iri), *value))
     }
 
-    /// Replaces the datatypes of the ontology in a rule body by tests. Returns alternative bodies, or the reason why the
-    /// rule cannot be used.
     fn with_ranges(&mut self, body: &[Atom]) -> Result<Vec<Conjunction>, &'static str> {
         let mut bodies = vec![Vec::new()];
         for atom in body {

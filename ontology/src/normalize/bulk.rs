@@ -15,9 +15,9 @@ use crate::vocab::{is_reserved, owl, rdf, rdfs};
 #[allow(clippy::struct_excessive_bools)] // independent observations
 struct NameUse {
     reserved: bool,
-    /// Whether the name is a blank node, or may be part of an axiom, a list, a rule or a header.
+    /// `true` if the name is a blank node, or may be part of an axiom, a list, a rule or a header.
     special: bool,
-    /// Whether the name is a blank node or has a declaration.
+    /// `true` if the name is a blank node or has a type of OWL's own vocabulary.
     declared: bool,
     class: bool,
     object: bool,

@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 use crate::graph::{Graph, subject_of};
 use crate::vocab::{owl, rdf};
 
-/// Maximum nesting depth. Expressions of real ontologies are nested less than 20 levels deep.
+/// Maximum nesting depth. Expressions of real ontologies stay far below it.
 pub(crate) const MAX_NESTING: usize = 128;
 
 /// Properties that lead from a class expression to its parts. The last two are links of lists and do not

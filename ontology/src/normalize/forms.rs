@@ -7,7 +7,7 @@
 //! - Axioms and annotations that are nodes with an IRI get a blank node instead.
 //! - Inverse properties in qualified cardinality restrictions get a name, which `crate::horned` translates
 //!   back.
-//! - Axioms that state the inverse of an anonymous inverse property state the equivalence of named properties.
+//! - Axioms that state the inverse of an anonymous inverse property become axioms about named properties.
 //! - Data ranges within the list of a union or intersection get a name with a definition, which
 //!   `crate::horned` replaces by the data range. horned-owl discards such a list if it visits the list before
 //!   a blank node in it, and the order of its visits differs from run to run.
@@ -176,8 +176,8 @@ fn correct_types(graph: &mut Graph) {
 const BUILT_IN_DATATYPES: [&str; 6] =
     [rdfs::LITERAL, rdf::PLAIN_LITERAL, rdf::LANG_STRING, rdf::XML_LITERAL, owl::REAL, owl::RATIONAL];
 
-/// Returns `true` if the first member of a list is a literal or a data range. The first member of a data range
-/// without a type decides.
+/// Returns `true` if the first member of a list is a literal or a data range. If the first member is an expression
+/// with a list, but without a type, the first member of that list decides.
 fn has_values(graph: &Graph, list: &Term, datatypes: &FxHashSet<Term>) -> bool {
     let mut list = list.clone();
     // The limit also ends cycles.
@@ -211,8 +211,6 @@ fn has_values(graph: &Graph, list: &Term, datatypes: &FxHashSet<Term>) -> bool {
     false
 }
 
-/// Names the blank nodes in the lists of data unions and data intersections, and defines the names as the
-/// nodes.
 fn name_ranges(graph: &mut Graph) {
     let mut cells: Vec<usize> = Vec::new();
     for (_, node) in graph.instances(rdfs::DATATYPE) {
@@ -278,7 +276,7 @@ fn replace_double_inverses(graph: &mut Graph) {
     remove_unreferenced(graph, nodes.into_iter().collect());
 }
 
-/// Removes the triples about blank nodes without a reference. horned-owl would report an inverse as left over.
+/// Removes the triples about blank nodes without a reference. horned-owl would report such an inverse as unread.
 fn remove_unreferenced(graph: &mut Graph, nodes: Vec<Term>) {
     if nodes.is_empty() {
         return;

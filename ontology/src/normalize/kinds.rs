@@ -90,7 +90,6 @@ struct Kinds<'a> {
 }
 
 impl Kinds<'_> {
-    /// Returns the OWL class for the kind of a property, from its declaration or its uses.
     fn of(&self, property: &str) -> Option<&'static str> {
         if self.declared.object_properties.contains(property) {
             Some(owl::OBJECT_PROPERTY)

@@ -20,7 +20,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<Ann
     groups
 }
 
-/// Maximum number of members of a set that [`groups`] leaves in the graph.
+/// Number of named members above which [`groups`] removes a set from the graph.
 const MAX_PAIRED_MEMBERS: usize = 16;
 
 /// Removes and returns axioms about more than [`MAX_PAIRED_MEMBERS`] disjoint named classes or different

@@ -45,7 +45,6 @@ pub(crate) struct Normal {
     /// Axioms and annotations that horned-owl does not have to read.
     pub plain: Parts,
     pub names: Names,
-    /// Origin of each rule. The canonical form of a rule has its index in this list as an annotation.
     pub rules: Vec<Origin>,
     pub warnings: Vec<Warning>,
 }
@@ -105,7 +104,7 @@ pub(crate) fn normalize(
         }
     }
     let mut warnings = Vec::new();
-    // The later passes are recursive, so expressions that are nested too deeply are rejected here.
+    // Later stages are recursive, so expressions that are nested too deeply are rejected here.
     if let Some((index, about)) = depth::too_deep(&graph) {
         // The document that contains the triple.
         let part = parts.partition_point(|(start, _)| *start <= index).saturating_sub(1);

@@ -86,7 +86,6 @@ struct Pass {
     variables: HashSet<Term>,
     /// Terms that occur outside of rules, except as classes.
     described: HashSet<Term>,
-    /// Properties that are declared as data properties, but not as object properties.
     data_properties: HashSet<Term>,
     /// Indices of the triples that are removed at the end of the pass.
     replaced: HashSet<usize>,
@@ -193,8 +192,6 @@ impl Pass {
         }
     }
 
-    /// Builds a property atom. It is a data atom if the stated type, the declaration of the property or
-    /// a literal as second argument requires this, and otherwise an object atom.
     fn property_atom(
         &mut self,
         property: Term,

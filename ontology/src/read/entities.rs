@@ -192,8 +192,6 @@ fn declarations(text: &[u8]) -> Option<Declarations<'_>> {
     }
 }
 
-/// Returns the length of the markup declaration (`<!…>`) at the start of a text. A `>` in quotes does
-/// not end the declaration.
 fn declaration_length(text: &[u8]) -> Option<usize> {
     let mut quote = None;
     for (index, &byte) in text.iter().enumerate() {

@@ -114,8 +114,6 @@ impl Resolver {
         self.catalogs.iter().find_map(|catalog| catalog.resolve(import))
     }
 
-    /// Returns the paths that the given catalogs, and the catalog next to the importing document, assign to an
-    /// import.
     fn targets(&self, import: &str, importer: Option<&Path>) -> Result<[Option<PathBuf>; 2], Error> {
         let given = self.given_target(import);
         let file = importer.and_then(Path::parent).map(|directory| directory.join(CATALOG));
@@ -137,8 +135,8 @@ impl Resolver {
     }
 }
 
-/// Reads a catalog. Its `xml:base` is the directory of its entries; the library supports this attribute of groups
-/// only.
+/// Reads a catalog. Applies `xml:base` of the root element here, because the library supports this attribute only
+/// for groups.
 fn catalog(file: &Path) -> Result<horned_catalog::Catalog, Error> {
     let unusable = |reason: String| Error::Catalog { file: file.to_owned(), reason };
     let text = std::fs::read_to_string(file).map_err(|error| unusable(error.to_string()))?;
@@ -153,7 +151,7 @@ fn catalog(file: &Path) -> Result<horned_catalog::Catalog, Error> {
     catalog.map_err(|error| unusable(error.to_string()))
 }
 
-/// Characters that a path can contain, but the path of an IRI cannot.
+/// Characters that a path can contain, but the path of an IRI contains only in escaped form.
 const ENCODED: &AsciiSet = &CONTROLS
     .add(b' ')
     .add(b'"')
@@ -171,7 +169,6 @@ const ENCODED: &AsciiSet = &CONTROLS
     .add(b'|')
     .add(b'}');
 
-/// Returns the `file:` IRI of an absolute path.
 pub(crate) fn iri_of_file(path: &Path) -> String {
     let path = path.to_string_lossy();
     // On Windows, canonical paths have the form `\\?\C:\kb\robot.ttl`; the IRI is `file:///C:/kb/robot.ttl`.

@@ -95,7 +95,6 @@ fn xml_root(mut text: &[u8]) -> Option<(&[u8], &[u8])> {
     }
 }
 
-/// Returns the value of an attribute of the root element of an XML document.
 pub(super) fn root_attribute<'a>(text: &'a [u8], name: &[u8]) -> Option<&'a str> {
     let (_, mut tail) = xml_root(text)?;
     loop {
@@ -113,7 +112,6 @@ pub(super) fn root_attribute<'a>(text: &'a [u8], name: &[u8]) -> Option<&'a str>
     }
 }
 
-/// Returns the name of the root element of an XML document, if the root element is not closed.
 pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
     let (root, tail) = xml_root(text)?;
     let close = [b"</", root].concat();

@@ -147,7 +147,7 @@ impl Runtime {
         let mut required: BTreeMap<Symbol, BigRational> = BTreeMap::new();
         for requirement in facts.objects(objective, terms::HAS_NFR) {
             let kinds = facts.objects(requirement, terms::IS_TYPE).into_iter();
-            // `rejections` compares the other estimations, with measurements of the environment.
+            // `rejections` considers the attributes with a comparison operator.
             let kind = kinds.filter(|&kind| facts.texts(kind, terms::OPERATOR).is_empty()).min();
             required.extend(kind.zip(facts.number(requirement, terms::HAS_VALUE)));
         }
@@ -180,7 +180,7 @@ impl Runtime {
         // considers.
         let delete = copy.statements(grounding, terms::HAS_QA_VALUE);
         copy.apply(Delta { insert: Vec::new(), delete })?;
-        // The error has another cause than this attribute.
+        // An error at this point has another cause than this attribute.
         if copy.error_status(&name)?.is_some() {
             return Ok(None);
         }

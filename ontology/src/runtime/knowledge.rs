@@ -107,9 +107,8 @@ impl Runtime {
         Ok(net)
     }
 
-    /// Ends a cycle of the adaptation loop and returns the violated constraints. In latch mode without
-    /// violations, turns conclusions into assertions. The MROS reasoner does not adapt while there are
-    /// violations.
+    /// Ends a cycle of the adaptation loop and returns the violations. In latch mode without violations, turns
+    /// conclusions into assertions. The MROS reasoner does not adapt while there are violations.
     ///
     /// # Errors
     /// Returns the errors of [`Runtime::apply`].
@@ -168,7 +167,7 @@ impl Runtime {
         let facts = self.facts();
         let (component, _) = self.all_facts().find("component", terms::COMPONENT, component)?;
         let is_fault_status = |status: &String| change::is_failed(status) || change::is_recovered(status);
-        // As in MROS: designs are available again until rules conclude the opposite.
+        // MROS does this, too: designs are available again until rules conclude the opposite.
         if self.mode == Mode::Latch && facts.texts(component, terms::STATUS).iter().any(is_fault_status) {
             for design in self.all_facts().members(terms::FUNCTION_DESIGN) {
                 delta.delete.extend(self.statements(design, terms::REALISABILITY));

@@ -20,7 +20,7 @@ pub struct NewObjective<'a> {
     pub function: &'a str,
     /// Non-functional requirements: IRI or local name of an attribute type, and a bound in its unit.
     pub requirements: Vec<(&'a str, Literal)>,
-    /// Whether a better design is searched even while the objective has no problem.
+    /// `true` if a better design is searched even while the objective has no problem.
     pub always_improve: bool,
 }
 
@@ -208,8 +208,6 @@ impl Runtime {
         delete
     }
 
-    /// Returns the individuals that hold measurements of the attribute types for which a design has
-    /// estimations; none in latch mode.
     fn measurements(&self, design: Symbol) -> Vec<Symbol> {
         if self.mode == Mode::Latch {
             return Vec::new();
@@ -220,8 +218,6 @@ impl Runtime {
         kinds.flat_map(|kind| change::holders(facts, kind)).collect()
     }
 
-    /// Returns the IRI of a grounding: `fg_` and the name of the design without `fd_`, with the objective's
-    /// name as a suffix if another objective has a grounding with this IRI.
     fn grounding_name(&self, objective: Symbol, design: Symbol) -> String {
         let facts = self.facts();
         let (design, owner) = (self.individual(design).name, self.individual(objective).name);

@@ -20,14 +20,13 @@ pub struct Objective {
     /// The function to provide, if one is stated.
     pub function: Option<Individual>,
     /// Statuses that are stated or concluded (`UNGROUNDED`, `IN_ERROR_COMPONENT`, …); empty if there is no problem.
-    /// Our metamodel allows several statuses; two are a contradiction only if a metamodel declares `o_status`
-    /// functional.
+    /// Several statuses are a contradiction only if the knowledge base declares `o_status` functional.
     pub statuses: Vec<String>,
-    /// Whether a component has recovered, so that a better design may be available.
+    /// `true` if a component has recovered, so that a better design may be available.
     pub updatable: bool,
-    /// Whether a better design is searched even while the objective has no problem.
+    /// `true` if a better design is searched even while the objective has no problem.
     pub always_improve: bool,
-    /// Designs that currently provide the function.
+    /// Designs in use for the objective.
     pub groundings: Vec<Grounding>,
 }
 
@@ -86,8 +85,6 @@ impl Runtime {
         Ok(derivations)
     }
 
-    /// Returns the facts with the values of a property of `subject` that count in the current
-    /// [`Mode`](super::Mode).
     fn property_facts(&self, subject: Symbol, property: Term) -> Vec<Fact> {
         let values = self.facts().objects(subject, property);
         let symbols = self.engine.symbols();

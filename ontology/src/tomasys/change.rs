@@ -81,7 +81,7 @@ pub fn component_status(engine: &mut Engine, component: &str, status: Status) ->
 }
 
 /// Builds the update that sets the status of a component in a given spelling. The spelling is not
-/// checked, so that a wrong spelling violates a constraint of the knowledge base.
+/// checked: a wrong spelling can violate a constraint of the knowledge base.
 ///
 /// # Errors
 /// Returns the errors of [`component_status`].

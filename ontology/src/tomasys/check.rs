@@ -48,7 +48,6 @@ fn functions(facts: Facts) -> Vec<Warning> {
     warnings
 }
 
-/// Reports bounds of designs without minimum and maximum, and requirements of objectives without a value.
 fn requirements(facts: Facts) -> Vec<Warning> {
     let has_value = |requirement: Symbol, properties: &[Term]| {
         properties.iter().any(|property| !facts.literals(requirement, property).is_empty())
@@ -211,8 +210,6 @@ fn kinds_of_ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str
     kinds
 }
 
-/// Returns the kinds of the literals that atoms of this property in rule bodies require as its value, as in
-/// `p(?x, true)`. Comparisons by built-ins are not considered.
 fn tested_kinds(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
     let atoms = ontology.rules.iter().flat_map(|rule| &rule.body);
     let constants = atoms.filter_map(|atom| match atom {

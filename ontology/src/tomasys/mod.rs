@@ -197,8 +197,8 @@ impl<'a> View<'a> {
         components.map(|individual| Component { status: status(&individual), individual }).collect()
     }
 
-    /// Returns all measured values: of individuals with `isMeasured` true, and of individuals named `obs_…`
-    /// as in MROS. Omits individuals without an attribute type.
+    /// Returns all measured values: quality attribute values with `isMeasured` true, or named `obs_…` as in MROS.
+    /// Omits individuals without an attribute type.
     pub fn measurements(&self) -> Vec<Measurement> {
         let measured = |value: &Individual| {
             value.name.starts_with("obs_")

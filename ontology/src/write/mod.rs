@@ -1,8 +1,8 @@
 //! Writes knowledge bases in all supported syntaxes: documents and their imports are merged into one document
 //! without imports.
 //!
-//! The RDF syntaxes contain every triple that was read, except imports and the headers of imported ontologies, with
-//! renamed blank nodes. Functional-style syntax and OWL/XML contain entities, axioms, annotations and rules; all
+//! The RDF syntaxes contain every triple that was read, except imports and the headers of all documents but the first,
+//! with renamed blank nodes. Functional-style syntax and OWL/XML contain entities, axioms, annotations and rules; all
 //! other triples cause warnings.
 
 mod functional;

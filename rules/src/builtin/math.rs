@@ -1,6 +1,6 @@
 //! Numeric and boolean functions. On decimals, results are exact up to 34 fractional digits; sines, cosines, tangents
-//! and powers with fractional exponents are doubles. On other numbers, the result has the widest floating-point type
-//! of the arguments.
+//! and powers with fractional exponents are doubles. On other numbers, an integer quotient is an integer, and any other
+//! result has the widest floating-point type of the arguments.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -12,8 +12,8 @@ use crate::literal::{Decimal, Literal, ten_to};
 /// Maximum absolute exponent of an exact power. A power with a larger exponent has no result.
 const MAX_EXPONENT: u32 = 1000;
 
-/// Maximum number of digits for rounding; a double has at most 1074 fractional digits. A larger number counts as
-/// the maximum, or has no result for a decimal if it exceeds `i32`.
+/// Maximum number of digits for rounding; a double has at most 1074 fractional digits. A larger number is reduced to
+/// the maximum. For a decimal, a number beyond `i32` has no result.
 const MAX_DIGITS: i32 = 1100;
 
 enum Numbers {
@@ -128,8 +128,7 @@ fn rounded_float<F: std::str::FromStr>(values: &[f64]) -> Option<F> {
     text.parse().ok()
 }
 
-/// Returns the `xsd:integer` quotient of two floats, truncated toward zero. `None` for a division by 0, of an
-/// infinite number, or of NaN.
+/// Returns the `xsd:integer` quotient of two floats, truncated toward zero. `None` if the quotient is infinite or NaN.
 fn integer_quotient(values: &[f64]) -> Option<Literal> {
     let [dividend, divisor] = *values else { return None };
     let quotient = BigRational::from_float((dividend / divisor).trunc())?;

@@ -1,8 +1,8 @@
 //! Built-ins of SWRL (`swrlb`, section 8 of [1]; without those on lists) on the value spaces of XSD, with the
 //! functions of `XPath` ([2]). URIs follow [3].
 //!
-//! Arguments of an unsuitable kind make a built-in false, and never cause an error. A computed result is compared
-//! with a bound first argument by *identity* of interned values, so that the outcome does not depend on the
+//! Arguments of an unsuitable kind make every built-in but `notEqual` false, and never cause an error. A computed result
+//! is compared with a bound first argument by *identity* of interned values, so that the outcome does not depend on the
 //! evaluation order.
 //!
 //! A built-in that composes a value of parts (a date of year, month and day) also works backwards: it splits a known

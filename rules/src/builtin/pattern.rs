@@ -89,7 +89,6 @@ fn build(pattern: &str, flags: &str) -> Result<Regex, String> {
 /// Characters at the start of an XML name, as members of a class (XML 1.0, fifth edition, production 4).
 const NAME_START: &str = ":A-Z_a-z\\x{C0}-\\x{D6}\\x{D8}-\\x{F6}\\x{F8}-\\x{2FF}\\x{370}-\\x{37D}\\x{37F}-\\x{1FFF}\\x{200C}-\\x{200D}\\x{2070}-\\x{218F}\\x{2C00}-\\x{2FEF}\\x{3001}-\\x{D7FF}\\x{F900}-\\x{FDCF}\\x{FDF0}-\\x{FFFD}\\x{10000}-\\x{EFFFF}";
 
-/// Additional characters within an XML name.
 const NAME_CONTINUE: &str = "\\-.0-9\\x{B7}\\x{300}-\\x{36F}\\x{203F}-\\x{2040}";
 
 /// The classes `\w` and `\W` of XML Schema, part 2, appendix G.

@@ -94,8 +94,8 @@ fn durations(built_in: BuiltIn, left: &Duration, right: &Duration) -> Option<Lit
     Some(Literal::Duration(Duration::new(months, Decimal::from_rational(&sum))))
 }
 
-/// Rounds months, halves up. Returns `None` for a division by 0, if the built-in is for another kind of
-/// duration or does not scale, and if the number of months exceeds the range of `i64`.
+/// Multiplies or divides a duration by a number. Months are rounded, halves up. Returns `None` for a division by 0, if
+/// the built-in is for another kind of duration, and if the number of months exceeds the range of `i64`.
 fn scaled(built_in: BuiltIn, duration: &Duration, factor: &BigRational) -> Option<Literal> {
     use BuiltIn as B;
     let divides = matches!(built_in, B::DivideYearMonthDuration | B::DivideDayTimeDuration);

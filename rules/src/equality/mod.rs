@@ -1,7 +1,7 @@
 //! Equality of individuals (`owl:sameAs`) by representatives: facts are stored once for each class of
 //! equal names ([1]).
 //!
-//! The engine's store, rules and recorded derivations mention only the representative of each class.
+//! The store, the compiled rules and the recorded derivations mention only the representative of each class.
 //! This module translates between names and representatives. A stated or derived pair merges two
 //! classes: one representative replaces the other in the stated facts and in the constants of the rules.
 //! Each equality records its premises at the time of derivation: stated facts and earlier equalities
@@ -11,9 +11,9 @@
 //! over-deletes along all derivations and needs no record of equalities.
 //!
 //! To a client, every name of an individual has all facts of the individual. A literal is never equal to a
-//! name or to another literal: a pair with a literal merges nothing and is reported as a violation. The pair
-//! of a name with itself holds only if it is stated. In rule bodies, an individual with several names is
-//! equal to itself.
+//! name or to another literal: a pair with a literal merges nothing. It is a violation unless the two are literals
+//! whose difference is undecided. The pair of a name with itself holds only if it is stated. In rule bodies, an
+//! individual with several names is equal to itself.
 //!
 //! [1] Motik, Nenov, Piro, Horrocks, "Handling owl:sameAs via rewriting", AAAI 2015.
 //! [2] Motik, Nenov, Piro, Horrocks, "Combining rewriting and incremental materialisation maintenance for Datalog
@@ -42,8 +42,8 @@ impl Program {
     /// `differentFrom` compares names. Two rules are added: `owl:differentFrom` is symmetric and irreflexive.
     ///
     /// `sameAs` in a body compares individuals, unless its terms are two different constants, or two variables that
-    /// no other atom binds. Then the atom matches pairs of names of individuals with several names. An individual
-    /// with one name then equals itself only if this pair is stated.
+    /// no other atom binds. Then the atom matches `owl:sameAs` facts between the names of individuals with several
+    /// names. The pair of an individual's only name with itself matches only if it is stated.
     #[must_use]
     pub fn with_equality(&self, symbols: &mut Symbols) -> Self {
         let (same_as, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
@@ -114,8 +114,6 @@ impl Equality {
         self.pairs.get(&fact.arguments[0]).is_some_and(|pairs| pairs.contains(fact))
     }
 
-    /// Returns `true` if a row (a fact about representatives) is the `owl:sameAs` pair of an individual
-    /// with itself. Rule bodies match such rows.
     fn is_reflexive(&self, row: &Fact) -> bool {
         row.predicate == self.same_as && row.arguments.len() == 2 && row.arguments[0] == row.arguments[1]
     }

@@ -24,7 +24,7 @@ struct Update<'e> {
     /// Maps each row whose stated facts have changed since the last [`Update::flush`] to the stated
     /// facts that the row represents now.
     pending_rows: BTreeMap<Fact, BTreeSet<Fact>>,
-    /// Whether a rule mentions a name whose class has changed since the last [`Update::flush`].
+    /// `true` if the class of a name that a rule mentions has changed since the last [`Update::flush`].
     rules_changed: bool,
     /// Net change of each row in this update: inserted (1), removed (-1), or both (0).
     net_change: FxHashMap<Fact, i8>,
@@ -32,7 +32,7 @@ struct Update<'e> {
     old_classes: FxHashMap<Symbol, Arc<[Symbol]>>,
     /// Facts that held before the update and may have ceased to hold. Not collected if `silent`.
     previous_facts: FxHashSet<Fact>,
-    /// Whether the update reports no changes (during the first evaluation).
+    /// `true` during the first evaluation, which reports no changes.
     silent: bool,
     pairs_to_join: Vec<Fact>,
     /// New rules, which the next [`Update::flush`] installs in the engine.
@@ -229,7 +229,7 @@ impl<'e> Update<'e> {
     fn mentions(&mut self, name: Symbol) -> Vec<Fact> {
         let mut rows = Vec::new();
         for relation in &mut self.engine.store.relations {
-            // Matches of constraints and aggregates are derived, so they need no restatement.
+            // Matches of constraints and aggregates are no facts: they are neither restated nor reported.
             let Some(predicate) = relation.predicate else { continue };
             for column in 0..relation.arity() {
                 if !relation.has_index(1 << column) {
@@ -249,7 +249,7 @@ impl<'e> Update<'e> {
     }
 
     /// Saves the class of `representative` before the class changes and, unless the update is silent, the
-    /// facts about its names. Each class is saved only once per update. In any case, records whether a rule
+    /// facts about its names. Each class is saved only once per update. Sets `rules_changed` if a rule
     /// mentions a name of the class.
     fn record_class(&mut self, representative: Symbol) {
         let class = self.equality.classes.class(representative);

@@ -66,8 +66,8 @@ impl Equality {
         rows.map(|arguments| Fact { predicate, arguments }).collect()
     }
 
-    /// Returns all facts that hold, in no particular order. Of the equalities in a class of more than `max_names`
-    /// names, the result contains only those with the first name.
+    /// Returns all facts that hold, in no particular order. For a class of more than `max_names` names, the only
+    /// equalities are the pairs of the first name with each other name, and stated pairs of a name with itself.
     pub fn facts(&self, engine: &Engine, max_names: usize) -> Vec<Fact> {
         let names = |symbol| self.names(symbol);
         let mut facts: Vec<Fact> = Vec::new();

@@ -85,7 +85,7 @@ pub(super) fn recurring(text: &str, local: &str) -> Option<(Box<str>, &'static s
         }
         _ => ("gDay", body.strip_prefix("---").is_some_and(|day| number(day, 1..=31))),
     };
-    // The year 0 has two forms, as `00` and `-00` denote the same number.
+    // The year 0 has two forms, `0000` and `-0000`.
     let body = body.strip_prefix('-').filter(|digits| digits.starts_with("0000")).unwrap_or(body);
     let zone = zone.map(zone_text).unwrap_or_default();
     valid.then(|| (format!("{body}{zone}").into(), local))

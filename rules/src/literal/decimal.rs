@@ -14,7 +14,7 @@ use num_traits::{One, Signed, ToPrimitive, Zero};
 /// `1e999999999` from filling the memory.
 const MAX_EXPONENT: u64 = 1000;
 /// Largest scale (number of fractional digits) of the small representation. `10^18` is the largest power of
-/// ten within 64 bits.
+/// ten that a signed 64-bit integer can hold.
 const SMALL_SCALE: u32 = 18;
 /// Number of fractional digits to which a rational number is rounded, such as an inexact quotient.
 const DIVISION_DIGITS: u32 = 34;
@@ -53,7 +53,7 @@ impl Decimal {
         };
         let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
         let fraction = match fraction.trim_end_matches('0') {
-            // Without any digit, the form is invalid.
+            // Keeps the zeros of a form such as `.00`: only a form without any digit may give an empty text.
             "" if whole.is_empty() => fraction,
             significant => significant,
         };
@@ -219,7 +219,7 @@ impl Ord for Decimal {
             (&self.0, &other.0)
         {
             let scale = *s.max(t);
-            // |unscaled| < 2^63 and 10^18 < 2^60, so that the product fits 128 bits.
+            // |unscaled| <= 2^63 and 10^18 < 2^60, so that the product fits 128 bits.
             let widen = |unscaled: i64, from: u32| i128::from(unscaled) * 10_i128.pow(scale - from);
             return widen(*a, *s).cmp(&widen(*b, *t));
         }
@@ -281,7 +281,7 @@ mod tests {
                 assert_eq!(value.parts(), expected, "{zeros} {scale}");
             }
         }
-        // Quadratic time would be minutes.
+        // Quadratic time would take minutes.
         let long = format!("1.{}", "0".repeat(1_000_000));
         assert_eq!(Decimal::parse(&long), Some(Decimal::from(1)));
     }

@@ -37,8 +37,8 @@ impl Literal {
 }
 
 impl Literal {
-    /// Returns `true` for a valid moment or duration with a number that exceeds the limits of the program. Nothing
-    /// but its datatype is known.
+    /// Returns `true` for a valid moment or duration whose numbers exceed the supported range. Only its datatype is
+    /// known.
     pub fn exceeds_limits(&self) -> bool {
         let Self::Opaque { datatype, .. } = self else { return false };
         let local = datatype.strip_prefix(XSD);

@@ -73,7 +73,7 @@ impl Literal {
     }
 
     /// Decides whether the value lies in the value space of a datatype. Returns `None` if that is
-    /// undecided, because the datatype of the literal or the other datatype is unsupported.
+    /// undecided, for example because one of the datatypes is unsupported.
     pub fn membership(&self, datatype_iri: &str) -> Option<bool> {
         if self.is_ill_typed() {
             return Some(false);

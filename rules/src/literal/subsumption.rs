@@ -39,8 +39,6 @@ const DISJOINT: [&str; 18] = [
     "integer",
 ];
 
-/// Returns the local name of a datatype of XML Schema, `PlainLiteral`, or one of `owl:real` and
-/// `owl:rational`, which contain all decimals. Returns `None` for other datatypes.
 fn local(iri: &str) -> Option<&str> {
     match iri {
         OWL_REAL => Some("real"),

@@ -16,7 +16,7 @@ use num_traits::Zero;
 
 const DAY: i64 = 86_400;
 
-/// Distance of a calculated moment from 1970 in days, about a billion years, at which arithmetic is far from overflow.
+/// Maximum distance of a calculated moment from 1970 in days: about a billion years, far from an overflow.
 const MAX_DAYS: u64 = 366_000_000_000;
 /// Largest offset of a time zone from UTC, in seconds.
 const ZONE_LIMIT: i64 = 14 * 3600;
@@ -211,7 +211,7 @@ impl fmt::Display for Moment {
 
 impl Duration {
     /// Parses `P1Y2M3DT4H5M6.7S`, with an optional minus sign; `local` is the name of the datatype. Returns
-    /// `None` if the form is invalid.
+    /// `None` if the form is invalid for the datatype, or if a number is too large.
     pub(super) fn parse(lexical: &str, local: &str) -> Option<Self> {
         let (negative, body) = lexical.strip_prefix('-').map_or((false, lexical), |body| (true, body));
         let body = body.strip_prefix('P')?;
@@ -364,7 +364,7 @@ pub(super) fn within_limits(lexical: &str, local: &str) -> String {
         let is_long = length > MAX_DIGITS && !before.ends_with('.');
         match digits.as_bytes().first() {
             Some(_) if is_long && is_duration => result.push('1'),
-            // 20,000 years are a multiple of the period of the calendar.
+            // Leap years repeat every 400 years, and 400 divides 10,000: only the last four digits matter.
             Some(b'1'..=b'9') if is_long && is_first => {
                 result.push('2');
                 result += &digits[length - 4..];

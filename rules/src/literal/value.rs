@@ -44,7 +44,7 @@ pub enum Literal {
     /// `xsd:anyURI`.
     Uri(Box<str>),
     /// A literal of an unsupported datatype, a rational number that is not a decimal (in lowest terms), an XML
-    /// literal, or a moment or duration with a number of more than nine digits that exceeds the limits.
+    /// literal, or a moment or duration whose numbers exceed the supported range.
     Opaque {
         /// Lexical form as written; for a rational number, in lowest terms.
         lexical: Box<str>,
@@ -239,7 +239,6 @@ impl fmt::Display for Literal {
     }
 }
 
-/// Converts a float to the canonical form of XSD: `1.5E0`, `INF`, `NaN`.
 fn canonical_float<F: fmt::LowerExp>(value: F) -> String {
     let text = format!("{value:e}");
     match text.as_str() {

@@ -6,7 +6,8 @@ use crate::rule::RuleIdentity;
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// A rule negates or aggregates a relation that depends on its own conclusion.
+    /// The rules are not stratified: a rule negates or aggregates a relation that depends on its own conclusion.
+    /// The reported rule is such a rule, or its body depends on one.
     #[error("the rules are not stratified at rule {0}")]
     Unstratified(RuleIdentity),
     /// A step does not follow from earlier steps.

@@ -10,8 +10,8 @@ use crate::symbol::Symbol;
 
 type Relation = (Symbol, usize);
 
-/// Head relations and body relations of a rule. The number of a body relation is the least difference between
-/// its level and the level of the heads: 1 if the atom is negated or aggregated, otherwise 0.
+/// Head relations and body relations of a rule. The number of a body relation is the minimum difference between
+/// the level of the heads and the level of the relation: 1 if the atom is negated or aggregated, otherwise 0.
 struct Uses {
     heads: Vec<Relation>,
     body: Vec<(Relation, usize)>,

@@ -38,7 +38,7 @@ pub(super) struct Matcher<'m> {
     pub facts: &'m Facts,
     pub names: &'m Names,
     pub equality: bool,
-    /// Whether a rule required two names to differ although names may be equal. The given facts alone
+    /// `true` if a rule required two names to differ although names may be equal. The given facts alone
     /// then do not determine the result.
     pub compares_names: bool,
     pub too_many: bool,
@@ -194,7 +194,7 @@ impl Matcher<'_> {
             Atom::Different(left, right) => {
                 self.difference(find(self.names, left), find(self.names, right)) == Some(true)
             }
-            // Like a difference, a missing equality is one that the whole model does not have.
+            // Also uses all equalities, because the names must be unequal in the whole model.
             Atom::NotSame(left, right) => {
                 let (left, right) = (find(self.names, left), find(self.names, right));
                 left.is_some() && right.is_some() && left != right
@@ -216,8 +216,8 @@ impl Matcher<'_> {
         }
     }
 
-    /// Returns `true` if two symbols certainly differ; `None` if one is missing. Sets [`Matcher::compares_names`] if names
-    /// may be equal.
+    /// Returns `true` if two symbols certainly differ; `None` if one is missing. Sets [`Matcher::compares_names`] if
+    /// both are names and equality applies.
     fn difference(&mut self, left: Option<Symbol>, right: Option<Symbol>) -> Option<bool> {
         let (left, right) = (left?, right?);
         let is_name = |symbol| self.symbols.value(symbol).as_name().is_some();

@@ -12,8 +12,8 @@
 //! With equality, facts are compared by the first name of each class of equal names. A step may use only
 //! equalities of earlier steps.
 //!
-//! The checker uses nothing of the engine's store, plans, strata or records. It uses only the rules as data,
-//! and the evaluation of single built-ins and aggregates.
+//! The checker uses nothing of the engine's store, plans, strata or records. It shares the data types of rules, facts
+//! and literals, and the evaluation of single built-ins and aggregates.
 //!
 //! \[1\] Przymusinski, "On the declarative semantics of deductive databases and logic programs", 1988.
 //! \[2\] Gelfond, Lifschitz, "The stable model semantics for logic programming", ICLP 1988.
@@ -111,7 +111,7 @@ impl Replayer<'_> {
         fact.display(self.matcher.symbols).to_string()
     }
 
-    /// Checks that no literal is ill-typed, and that no literal equals a different literal or a name.
+    /// Checks that no literal is ill-typed, and that no literal equals another literal or a name.
     fn consistent(&self, derivation: &Derivation) -> Result<(), Fault> {
         let symbols = &*self.matcher.symbols;
         let literal = |symbol: Symbol| symbols.value(symbol).as_literal();
@@ -135,7 +135,7 @@ impl Replayer<'_> {
         for rule in &self.program.rules {
             rules.entry(&rule.identity).or_default().push(rule);
         }
-        // Knowledge before a step: the equal names and, under equality, the facts of all earlier steps.
+        // State before a step: the equal names and, under equality, the facts of all earlier steps.
         let mut names = Names::default();
         let mut established: FxHashSet<Fact> = FxHashSet::default();
         for (position, step) in derivation.steps.iter().enumerate() {
@@ -174,7 +174,6 @@ impl Replayer<'_> {
         Ok(())
     }
 
-    /// Checks that a rule derives the step at `position` from earlier steps.
     fn follows(
         &mut self,
         rule: &Rule,
@@ -223,8 +222,6 @@ impl Replayer<'_> {
         }
     }
 
-    /// Checks that all stated facts and all conclusions of rules are present, and that no integrity
-    /// constraint is violated. Returns the number of rule matches.
     fn closed(&mut self, stated: &[Fact]) -> Result<usize, Fault> {
         if let Some(fact) =
             stated.iter().find(|fact| !self.matcher.facts.contains(&self.matcher.names.normal(fact)))

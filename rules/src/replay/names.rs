@@ -5,8 +5,7 @@ use rustc_hash::FxHashMap;
 use crate::fact::Fact;
 use crate::symbol::Symbol;
 
-/// Union-find: maps a name to a smaller name of its class. A name without an entry is the first of its
-/// class.
+/// Union-find: maps a name to a smaller name of its class. The first name of a class has no entry.
 #[derive(Default)]
 pub(super) struct Names(FxHashMap<Symbol, Symbol>);
 

@@ -49,7 +49,7 @@ struct Lexer {
     cursor: usize,
     line: u32,
     column: u32,
-    /// Error within the current token, whose end is known.
+    /// Error within a token that was nevertheless read to its end.
     error: Option<String>,
 }
 

@@ -18,7 +18,7 @@ const LIBRARIES: [&str; 2] =
 /// Syntax options of rule texts.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Syntax {
-    /// Whether the extensions of SWRL, `not` and aggregates, are rejected.
+    /// If `true`, the extensions of SWRL (`not` and aggregates) are rejected.
     pub swrl_only: bool,
     /// Built-ins in addition to those of SWRL, see [`BuiltIn::custom`].
     pub built_ins: Vec<BuiltIn>,
@@ -135,7 +135,6 @@ struct Parser<'a> {
     /// included; `unknown` removes them.
     foreign: Vec<ForeignAtom>,
     errors: Vec<Error>,
-    /// Number of aggregates that are being parsed.
     aggregate_depth: u8,
 }
 
@@ -369,7 +368,6 @@ impl Parser<'_> {
         Ok(Atom::Aggregate { aggregate, result, body })
     }
 
-    /// Creates the atom of a datatype used as a predicate, which tests membership of `value` in the datatype.
     fn data_range(&mut self, value: Term, datatype: String) -> Atom {
         let datatype = self.symbols.literal(Literal::Uri(datatype.into()));
         Atom::BuiltIn { built_in: BuiltIn::DataRange, arguments: vec![value, Term::Constant(datatype)] }

@@ -77,8 +77,8 @@ impl Granularity {
     }
 }
 
-/// Converts an argument to a moment: a date, a date with time, or the (possibly truncated) text of either.
-/// Returns `None` for other literals.
+/// Converts an argument to a moment: a date, a date with time, or the (possibly truncated) text of either. A truncated
+/// literal of these datatypes is ill-typed, but accepted. Returns `None` for other literals.
 fn moment(literal: &Literal) -> Option<Moment> {
     let text = match literal {
         Literal::Moment(moment) if moment.kind() != MomentKind::Time => return Some(moment.clone()),
@@ -105,7 +105,6 @@ fn moment(literal: &Literal) -> Option<Moment> {
     }
 }
 
-/// Returns `true` if the moments are comparable: all have a time zone, or none has.
 fn comparable(moments: &[Moment]) -> bool {
     moments.windows(2).all(|pair| pair[0].zone_text().is_empty() == pair[1].zone_text().is_empty())
 }
@@ -173,7 +172,7 @@ impl Definition for AddFunction {
         true
     }
 
-    /// Returns an `xsd:date` for a date and a granularity of days or coarser, and an `xsd:dateTime`
+    /// Returns an `xsd:date` for an `xsd:date` and a granularity of days or coarser, and an `xsd:dateTime`
     /// otherwise.
     fn compute(&self, arguments: &[&Literal]) -> Option<Literal> {
         let [from, count, granularity] = arguments else { return None };
