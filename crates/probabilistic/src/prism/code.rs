@@ -1,8 +1,7 @@
 //! Typed expressions with resolved names, and their evaluation.
 //!
 //! Arithmetic is exact, so that `1 - 0.7 - 0.3` is zero even if the model is solved in doubles.
-//! Only irrational logarithms and powers, and very large powers, are approximated by doubles. The same holds for
-//! rational logarithms that are no integers.
+//! Only logarithms that are not integers, irrational powers and very large powers are approximated by doubles.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
