@@ -114,8 +114,8 @@ impl<'t> Table<'t> {
     }
 
     /// Calls `check` with the bounds before and after each abstract transition of each operator. An operator
-    /// whose condition and effects do not contain the pattern's variables is checked only once. Returns an
-    /// error if `check` returns `false`.
+    /// without facts and effects on the pattern's variables is checked only once. Returns an error if `check`
+    /// returns `false`.
     fn each_transition(
         &self,
         model: &Model,
@@ -123,8 +123,8 @@ impl<'t> Table<'t> {
     ) -> Result<(), String> {
         for (operator, position) in model.operators.iter().zip(0..) {
             if !self.touches(operator) {
-                // The operator leads from each combination to itself, so checking a single finite
-                // value suffices.
+                // The operator leads from each combination to itself, so checking the greatest finite value
+                // suffices.
                 let finite = self.values.iter().flatten().max();
                 if finite.is_some() && !check(operator, finite, finite) {
                     return Err(format!("operator {position}, which changes no variable of the table"));

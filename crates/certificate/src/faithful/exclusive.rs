@@ -37,8 +37,8 @@ pub(super) fn holds_initially(world: &World<'_>, group: &Group) -> bool {
     group.iter().all(is_basic) && group.iter().filter(|key| world.holds_initially(key)).count() <= 1
 }
 
-/// Returns `true` if at most one atom of a group holds after a case, given that at most one holds
-/// before it. `false` means violated or not proved after [`SPLIT_LIMIT`] partial states.
+/// Returns `true` if at most one atom of a group holds after a case, given that at most one holds before it. `false`
+/// means violated or not proved.
 pub(super) fn keeps(
     structure: &Structure,
     may_hold: &dyn Fn(&Key) -> bool,

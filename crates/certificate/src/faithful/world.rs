@@ -203,7 +203,6 @@ impl<'w> World<'w> {
         format!("({})", words.join(" "))
     }
 
-    /// Formats an action instance.
     pub(super) fn call(&self, action: &Action, arguments: &[u32]) -> String {
         let words = arguments.iter().map(|object| self.name(*object));
         let words: Vec<&str> = std::iter::once(action.identifier.name.as_str()).chain(words).collect();

@@ -134,7 +134,6 @@ impl Knowledge {
         self.terms.as_ref()
     }
 
-    /// Returns the asserted facts.
     pub(crate) fn stated(&self) -> Vec<Fact> {
         let engine = self.engine();
         match &self.stated {

@@ -17,7 +17,7 @@ pub struct ValueRead {
     holder: Term,
     /// The value. `None` if the condition is negated, or only requires that there is a measurement.
     pub value: Option<Term>,
-    /// `true` if the individual is an estimation of a design, so no measurement.
+    /// `true` if the individual is an estimation of a design, not a measurement.
     pub is_estimation: bool,
     /// Facts that the rule requires of the individual: property and attribute type.
     kinds: Vec<(Symbol, Symbol)>,
@@ -40,9 +40,8 @@ impl ValueRead {
         }
     }
 
-    /// Returns `true` if the individual can be a measurement of an attribute for which no design has a requirement, and
-    /// which has no comparison operator. The attribute is given by IRI. The result may also be `true` if the individual
-    /// cannot.
+    /// Returns `true` if the individual may be a measurement of the attribute with this IRI. Assumes that no design
+    /// has a requirement for the attribute, and that the attribute has no comparison operator.
     fn can_measure(&self, attribute: &str, symbols: &Symbols) -> bool {
         let is_attribute = |kind: Symbol| symbols.value(kind).as_name() == Some(attribute);
         match self.holder {
@@ -66,8 +65,9 @@ pub(super) fn value_reads(engine: &Engine) -> Arc<[Vec<ValueRead>]> {
     engine.program().rules.iter().map(reads).collect()
 }
 
-/// Returns `true` if a rule or an axiom can read a measurement of an attribute for which no design has a requirement,
-/// and which has no comparison operator. The attribute is given by IRI. `reads` is the result of [`value_reads`].
+/// Returns `true` if a rule or an axiom may read a measurement of the attribute with this IRI. Assumes that no design
+/// has a requirement for the attribute, and that the attribute has no comparison operator. `reads` is the result of
+/// [`value_reads`].
 pub(super) fn is_read(engine: &Engine, reads: &[Vec<ValueRead>], attribute: &str) -> bool {
     let symbols = engine.symbols();
     engine.program().rules.iter().zip(reads).any(|(rule, reads)| {
