@@ -30,8 +30,6 @@ const GROUP_LIMIT: usize = 300;
 /// A mutex group: atoms of which at most one holds.
 pub(super) type Group = BTreeSet<Key>;
 
-/// Returns `true` if no atom of a group is static or derived, and at most one atom of the group
-/// holds initially.
 pub(super) fn holds_initially(world: &World<'_>, group: &Group) -> bool {
     let is_basic = |key: &Key| world.changes(key.0) && world.rules(key.0).is_none();
     group.iter().all(is_basic) && group.iter().filter(|key| world.holds_initially(key)).count() <= 1

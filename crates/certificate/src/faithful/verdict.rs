@@ -137,7 +137,6 @@ impl Cause {
         Self::Unsupported { construct: construct.into() }
     }
 
-    /// Adds to an unsupported construct in which part of the files it occurs.
     pub(super) fn within(self, part: &str) -> Self {
         match self {
             Self::Unsupported { construct } => Self::unsupported(format!("{construct}; it occurs in {part}")),

@@ -190,7 +190,6 @@ impl<'w> World<'w> {
         Ok((self.symbol(&atom.predicate.name)?, objects.collect::<Result<_, _>>()?))
     }
 
-    /// Formats an atom or fluent in PDDL syntax, in lower case.
     pub(super) fn show(&self, key: &Key) -> String {
         match (key.0, &key.1[..]) {
             (PHASE, [number]) => return format!("(the phase phase {number})"),

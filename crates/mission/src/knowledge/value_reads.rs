@@ -13,7 +13,6 @@ pub const VALUE_PROPERTIES: [&str; 2] = ["hasValue", "qa_has_value"];
 /// A condition of a rule on the value of an individual, which may be negated or in an aggregate.
 #[derive(Debug, Clone)]
 pub struct ValueRead {
-    /// Individual that has the value.
     holder: Term,
     /// The value. `None` if the condition is negated, or only requires that there is a measurement.
     pub value: Option<Term>,
@@ -40,8 +39,8 @@ impl ValueRead {
         }
     }
 
-    /// Returns `true` if the individual may be a measurement of the attribute with this IRI. Assumes that no design
-    /// has a requirement for the attribute, and that the attribute has no comparison operator.
+    /// Returns `true` if the individual may be a measurement of the attribute with this IRI. Assumes that no design has
+    /// a requirement for the attribute, and that the attribute has no comparison operator.
     fn can_measure(&self, attribute: &str, symbols: &Symbols) -> bool {
         let is_attribute = |kind: Symbol| symbols.value(kind).as_name() == Some(attribute);
         match self.holder {
