@@ -25,7 +25,7 @@ pub struct ValueRead {
 }
 
 impl ValueRead {
-    /// Returns `true` if the individual can be that of the measurement.
+    /// Returns `true` if this condition can read the value of the measurement.
     pub fn can_be(&self, measurement: &Measurement, engine: &Engine) -> bool {
         let symbols = engine.symbols();
         let iri = measurement.individual.iri.as_str();
@@ -39,8 +39,8 @@ impl ValueRead {
         }
     }
 
-    /// Returns `true` if the individual may be a measurement of the attribute with this IRI. Assumes that no design has
-    /// a requirement for the attribute, and that the attribute has no comparison operator.
+    /// Returns `true` if the individual may be a measurement of the attribute with this IRI. Assumes that no
+    /// design has a requirement for the attribute, and that the attribute has no comparison operator.
     fn can_measure(&self, attribute: &str, symbols: &Symbols) -> bool {
         let is_attribute = |kind: Symbol| symbols.value(kind).as_name() == Some(attribute);
         match self.holder {
@@ -64,9 +64,9 @@ pub(super) fn value_reads(engine: &Engine) -> Arc<[Vec<ValueRead>]> {
     engine.program().rules.iter().map(reads).collect()
 }
 
-/// Returns `true` if a rule or an axiom may read a measurement of the attribute with this IRI. Assumes that no design
-/// has a requirement for the attribute, and that the attribute has no comparison operator. `reads` is the result of
-/// [`value_reads`].
+/// Returns `true` if a rule or an axiom may read a measurement of the attribute with this IRI. Assumes that no
+/// design has a requirement for the attribute, and that the attribute has no comparison operator. `reads` is
+/// the result of [`value_reads`].
 pub(super) fn is_read(engine: &Engine, reads: &[Vec<ValueRead>], attribute: &str) -> bool {
     let symbols = engine.symbols();
     engine.program().rules.iter().zip(reads).any(|(rule, reads)| {
