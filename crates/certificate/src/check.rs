@@ -1,6 +1,6 @@
-//! Checks an optimality proof (argument) against the ground task, by induction over the steps of
-//! plans. The labels (states with costs) of the argument must cover all states that matter. Uses
-//! integer arithmetic only.
+//! Checks an optimality proof (argument) against the ground task, by induction over the steps of plans. Each
+//! state that matters must be covered by a label (state with a cost) of the argument, or pruned by a lower
+//! bound. Arithmetic is exact.
 
 use std::rc::Rc;
 
@@ -219,8 +219,7 @@ impl Checker<'_> {
         })
     }
 
-    /// Returns `true` if a lower bound or a label proves the claim for all plans through a state
-    /// that is reached at cost `paid`.
+    /// Returns `true` if a lower bound prunes a state that is reached at cost `paid`, or if a label covers it.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
         let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,

@@ -64,6 +64,7 @@ impl Integer {
 
     pub(crate) fn div_floor(&self, divisor: &Self) -> Self {
         match (&self.0, &divisor.0) {
+            // Divisors are positive, so Euclidean division rounds down.
             (Small(own), Small(other)) => Self(Small(own.div_euclid(*other))),
             _ => Self::from(self.to_big().div_floor(&divisor.to_big())),
         }

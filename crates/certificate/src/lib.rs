@@ -1,4 +1,4 @@
-//! Checks optimality certificates of plans by integer arithmetic.
+//! Checks optimality certificates of plans in exact arithmetic.
 //!
 //! The optimality proof is a closed set of labels \[1\]. A label is a state with the cost of reaching it. A
 //! label *covers* a state with the same values of variables if the state costs no less and has no larger

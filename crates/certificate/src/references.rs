@@ -8,7 +8,6 @@ use crate::model::{self, Condition, Exclusion, Fact, Linear, Literal, Model, Ope
 
 type Found = Result<(), String>;
 
-/// Upper limit on the number of design combinations for a list of slots.
 const CHOICE_LIMIT: usize = 1 << 20;
 const TABLE_LIMIT: usize = 1 << 22;
 

@@ -128,8 +128,6 @@ impl Model {
         numbers.fold(quantity, |sum, (number, factor)| &sum + &(&state.numbers[*number as usize] * factor))
     }
 
-    /// Returns `true` if a condition holds in a state for a choice of designs. Only its comparisons
-    /// depend on the choice.
     pub(super) fn holds(
         &self,
         condition: &Condition,

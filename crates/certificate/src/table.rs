@@ -113,8 +113,8 @@ impl<'t> Table<'t> {
         targets
     }
 
-    /// Calls `check` with the bounds before and after each abstract transition of each operator. An operator
-    /// whose condition and effects do not contain the pattern's variables is checked only once. Returns an
+    /// Calls `check` with the bounds before and after each abstract transition of each operator. An
+    /// operator without facts and effects on the pattern's variables is checked only once. Returns an
     /// error if `check` returns `false`.
     fn each_transition(
         &self,
@@ -123,7 +123,7 @@ impl<'t> Table<'t> {
     ) -> Result<(), String> {
         for (operator, position) in model.operators.iter().zip(0..) {
             if !self.touches(operator) {
-                // The operator leads from each combination to itself, so checking a single finite
+                // The operator leads from each combination to itself, so checking the greatest finite
                 // value suffices.
                 let finite = self.values.iter().flatten().max();
                 if finite.is_some() && !check(operator, finite, finite) {
@@ -143,7 +143,6 @@ impl<'t> Table<'t> {
     }
 }
 
-/// Returns `true` if `left ≤ right + step`, where `None` is infinity.
 fn at_most(left: Bound<'_>, right: Bound<'_>, step: &Integer) -> bool {
     right.is_none_or(|right| left.is_some_and(|left| *left <= right + step))
 }
@@ -219,7 +218,6 @@ fn lower_end(linear: &Linear, number: u32) -> Option<Integer> {
     (is_alone(linear, number) && tables.is_empty()).then(|| -constant)
 }
 
-/// Returns `true` if a linear expression is the number itself (factor 1) plus a quantity.
 pub(super) fn is_alone(linear: &Linear, number: u32) -> bool {
     linear.factors == [(number, Integer::from(1))]
 }

@@ -104,7 +104,6 @@ impl Bindings {
         bound.chain(SOLVES.map(Name::new)).collect()
     }
 
-    /// Returns the class of a bound type, as local name or IRI.
     pub(super) fn class(&self, name: &Name) -> Option<String> {
         match self.r#type(name) {
             Some(Query::Class(class)) => Some(class),
@@ -311,7 +310,6 @@ impl Fill<'_> {
         self.problem.objects.extend(objects);
     }
 
-    /// Adds a fact to the problem unless an argument is not a PDDL name.
     fn fact(&mut self, predicate: &Name, arguments: &[&str]) {
         if arguments.iter().all(|argument| is_pddl_name(argument)) {
             self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));

@@ -20,7 +20,6 @@ pub(crate) const CODE: &str = "M131";
 /// Limit on the size of the files that `read` reads, in bytes. The limit does not apply to standard input.
 const LARGEST: u64 = 1 << 28;
 
-/// Reads a regular file of at most `LARGEST` bytes.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     let metadata = std::fs::metadata(path)?;
     if metadata.is_dir() {

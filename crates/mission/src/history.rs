@@ -8,8 +8,8 @@ use crate::message::Message;
 
 impl Mission {
     /// Returns an error (M310) for each timed initial literal and for each constraint whose satisfaction by the rest
-    /// of a plan depends on earlier states. The adaptation loop plans from the present state and does not know earlier
-    /// ones.
+    /// of a plan depends on earlier states. The adaptation loop plans from the present state and does not store
+    /// earlier states.
     pub fn depends_on_past(&self) -> Vec<Message> {
         let error = |source: &Source, span: Span, text: &str| {
             let diagnostic = Diagnostic::new(source, span, Severity::Error, "M310", text);

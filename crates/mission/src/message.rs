@@ -230,7 +230,6 @@ impl Message {
 }
 
 impl fmt::Display for Message {
-    /// Writes [`Message::text`] without the line break at its end.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.text().trim_end())
     }
@@ -247,7 +246,6 @@ pub struct ErrorAnswer<'a> {
     /// Name and version of this format.
     #[cfg_attr(feature = "schema", schemars(extend("const" = ERROR_FORMAT)))]
     format: &'static str,
-    /// All errors and warnings.
     messages: &'a [Message],
 }
 

@@ -138,8 +138,8 @@ impl Diagnostic {
 }
 
 /// Maximum number of diagnostics of one pass (parsing or checking) over one file. If there is exactly one more,
-/// it is reported, too; if there are more, the message P119 with their number is. Otherwise a file in another
-/// language would produce very many diagnostics.
+/// it is reported, too. If there are more, the message P119 with their number replaces them. Otherwise a file in
+/// another language would produce very many diagnostics.
 const MAX_DIAGNOSTICS: usize = 200;
 
 #[derive(Debug)]

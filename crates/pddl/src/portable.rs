@@ -189,8 +189,6 @@ fn walk<'t>(domain: &'t Domain, problem: &'t Problem, visit: Visit<'_, 't>) {
     problem.walk(visit);
 }
 
-/// Returns the numeric function that a node reads or changes: a fluent of an expression, or the target of a
-/// numeric effect.
 fn function(node: Node<'_>) -> Option<&Atom> {
     match node {
         Node::Effect(Effect::Assign(_, target, ..)) => Some(target),

@@ -42,7 +42,6 @@ impl TypeHierarchy {
         self.index.contains_key(name)
     }
 
-    /// Names of all types, in arbitrary order.
     pub(crate) fn names(&self) -> impl Iterator<Item = &Name> {
         self.index.keys()
     }

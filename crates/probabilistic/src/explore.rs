@@ -103,7 +103,6 @@ impl<S: Clone, N: Number> Choices<S, N> {
         [self.transitions.len(), self.ends.len(), self.rewards.len()]
     }
 
-    /// Removes all choices and transitions that were written after [`Self::mark`] returned these lengths.
     pub(crate) fn back_to(&mut self, [transitions, ends, rewards]: [usize; 3]) {
         self.transitions.truncate(transitions);
         self.ends.truncate(ends);

@@ -114,8 +114,6 @@ impl Fraction {
         Self::fitting(&rational).unwrap_or_else(|| Long(Box::new(rational)))
     }
 
-    /// Converts a rational to a short fraction. Returns `None` if the numerator or the denominator does not fit
-    /// into a signed 64-bit word.
     fn fitting(rational: &BigRational) -> Option<Self> {
         let denominator = rational.denom().to_i64()?.unsigned_abs();
         Some(Short(rational.numer().to_i64()?, NonZeroU64::new(denominator)?))
@@ -230,7 +228,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Integers with magnitudes up to 2^71, including values around the limits of a signed word.
     fn part() -> impl Strategy<Value = i128> {
         let sizes = (0_u32..72, any::<i128>()).prop_map(|(bits, number)| number >> (127 - bits));
         let word = i128::from(i64::MAX);

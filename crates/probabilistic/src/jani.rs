@@ -292,8 +292,6 @@ impl Writer<'_> {
         parts(condition).into_iter().filter_map(|part| self.fixes(part)).collect()
     }
 
-    /// Returns the variable and the value of a condition `variable = value`. Returns `None` for another
-    /// condition, or if the name belongs to a formula.
     fn fixes<'a>(&self, part: &'a Expr) -> Option<(&'a str, i64)> {
         let ExprKind::Binary(BinaryOp::Equal, left, right) = &part.kind else { return None };
         let (ExprKind::Name(name), ExprKind::Int(value)) = (&left.kind, &right.kind) else { return None };

@@ -19,8 +19,8 @@ pub(crate) fn is_whole(value: f64) -> bool {
     value.fract() == 0.0 && value < WHOLE
 }
 
-/// Adds two rewards. In doubles, the sum is an integer only if both rewards are integers, because integers count as
-/// exact: instead of another integral sum, an adjacent double is returned.
+/// Adds two rewards. Integers below 4·10^15 count as exact in doubles. So if the sum of other rewards rounds to such an
+/// integer, an adjacent double is returned instead.
 pub(crate) fn sum_of_rewards<N: Number>(left: &N, right: &N) -> N {
     let sum = left.plus(right);
     let [left, right, double] = [left, right, &sum].map(Number::to_f64);

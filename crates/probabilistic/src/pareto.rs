@@ -77,7 +77,7 @@ pub struct Pareto<'a, N> {
     /// states of infinite cost.
     alone: [Vec<N>; 2],
     alone_errors: [f64; 2],
-    /// The states in either target, without the blocked states.
+    /// The states in at least one of the two targets, without the blocked states.
     terminal: FixedBitSet,
     /// The states in which an expected cost is still to be paid and is infinite under every policy.
     blocked: FixedBitSet,

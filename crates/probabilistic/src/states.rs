@@ -7,8 +7,8 @@ use rustc_hash::FxBuildHasher;
 
 use crate::mdp::{MAX_COUNT, dense};
 
-/// Upper limit on the number of state codes for which a table is used. The operating system
-/// provides its memory on first access, so a sparse table needs less memory.
+/// Upper limit on the number of state codes for which a table is used. The operating system provides memory on first
+/// access, so unused parts of the table occupy none.
 const MAX_TABLE_CODES: usize = 1 << 29;
 
 /// A list of states with an index from states to their positions (state numbers).

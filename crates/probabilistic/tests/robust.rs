@@ -101,7 +101,6 @@ const PROPERTY_WORDS: [&str; 32] = [
     "s",
 ];
 
-/// Parses, checks and translates a model. Errors are accepted; only a panic fails the test.
 fn survive(text: &str) {
     if let Ok(model) = prism::parse(text) {
         let property = property::parse("Pmax=? [ F \"goal\" ]").expect("a property");

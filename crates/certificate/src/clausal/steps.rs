@@ -26,9 +26,9 @@ const STEP_LIMIT: usize = 64;
 /// transitions are not used.
 const EDGE_LIMIT: usize = 1 << 22;
 
-/// Returns the least T for which the lower bound `by`, with one of the potentials, proves that no
-/// plan of more than T steps costs less than `cost`. Returns an error if there is no such T up to
-/// [`STEP_LIMIT`].
+/// Returns the least T for which the lower bound `by`, with one of the potentials, implies that no plan of more
+/// than T steps costs less than `cost`. The potentials are not checked. Returns an error if there is no such T
+/// up to [`STEP_LIMIT`].
 pub(super) fn bound(
     model: &Model,
     argument: &Argument,
@@ -84,8 +84,7 @@ impl<'l> Layers<'l> {
         let mut idle: Option<Integer> = None;
         for operator in &model.operators {
             let cost = model.least(&operator.cost);
-            // Operators whose condition and effects do not contain the pattern's variables are self-loops of
-            // every row.
+            // Operators without facts and effects on the pattern's variables are self-loops of every row.
             if !table.touches(operator) {
                 idle = Some(idle.map_or(cost.clone(), |cheapest| cheapest.min(cost)));
                 continue;

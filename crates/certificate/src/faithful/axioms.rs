@@ -21,7 +21,6 @@ pub(super) struct Axioms {
 }
 
 impl Axioms {
-    /// Returns the truth value of a derived atom if it is equal in all states of the witness.
     pub(super) fn known(&self, key: &Key) -> Option<bool> {
         match (self.must.contains(key), self.may.contains(key)) {
             (true, _) => Some(true),

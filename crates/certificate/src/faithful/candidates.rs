@@ -13,9 +13,9 @@ use pddl::ast::{Atom, Condition, Name, Term, TypedName};
 const WORTHWHILE: usize = 16;
 
 impl Reader<'_> {
-    /// Returns the candidate objects of the first variable in `bound` under the condition `within`;
-    /// none if `bound` is empty. Returns all objects of its type if there is no condition, or if
-    /// the condition does not restrict the variable.
+    /// Returns the candidate objects of the first variable in `bound` under the condition `within`. Empty if `bound`
+    /// is empty. Returns all objects of its type if there is no condition, or if the condition does not restrict the
+    /// variable.
     pub(super) fn candidates(&self, bound: &[TypedName], within: Option<&Condition>) -> Vec<u32> {
         let Some(first) = bound.first() else { return Vec::new() };
         let hidden: Vec<&Name> = bound.iter().map(|variable| &variable.identifier.name).collect();

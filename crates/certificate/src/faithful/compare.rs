@@ -193,9 +193,8 @@ impl<'c> Comparison<'c> {
         Ok(())
     }
 
-    /// Returns `true` if `known` implies the condition `wanted`, by case splits on the leaves that
-    /// `admits` accepts. `false` means refuted, or not proved after [`SPLIT_LIMIT`]
-    /// partial states.
+    /// Returns `true` if `known` implies the condition `wanted`, by case splits on the leaves that `admits`
+    /// accepts. `false` means refuted or not proved.
     fn follows(&self, known: Known, wanted: &Formula, admits: &dyn Fn(&Formula) -> bool) -> bool {
         let structure = &self.task.names.structure;
         let mut open = vec![known];

@@ -30,15 +30,13 @@ const GROUP_LIMIT: usize = 300;
 /// A mutex group: atoms of which at most one holds.
 pub(super) type Group = BTreeSet<Key>;
 
-/// Returns `true` if no atom of a group is static or derived, and at most one atom of the group
-/// holds initially.
 pub(super) fn holds_initially(world: &World<'_>, group: &Group) -> bool {
     let is_basic = |key: &Key| world.changes(key.0) && world.rules(key.0).is_none();
     group.iter().all(is_basic) && group.iter().filter(|key| world.holds_initially(key)).count() <= 1
 }
 
-/// Returns `true` if at most one atom of a group holds after a case, given that at most one holds
-/// before it. `false` means violated or not proved after [`SPLIT_LIMIT`] partial states.
+/// Returns `true` if at most one atom of a group holds after a case, given that at most one holds before it. `false`
+/// means violated or not proved.
 pub(super) fn keeps(
     structure: &Structure,
     may_hold: &dyn Fn(&Key) -> bool,

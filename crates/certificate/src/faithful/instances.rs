@@ -95,7 +95,7 @@ pub(super) fn of(
     Ok(instances)
 }
 
-/// Returns `true` if the value of an expression is certainly above 0, whatever its parameters are.
+/// Returns `true` if the value of an expression is certainly above 0 or undefined, whatever its parameters are.
 fn is_positive(world: &World<'_>, expression: &Expression) -> bool {
     match expression {
         Expression::Number(number, _) => number.is_positive(),

@@ -11,9 +11,9 @@ use pddl::ast::{Comparison, DurationConstraint};
 type End = (BigRational, bool);
 
 impl<'r> Reader<'r> {
-    /// Returns the interval of the durations that satisfy all constraints, or `None` if no duration does or
-    /// if a bound is undefined. Fails if a bound depends on the state. Several possible durations are
-    /// supported only if they cannot be arbitrarily short and there are no timed events.
+    /// Returns the interval of the durations that satisfy all constraints, or `None` if no duration does or if a
+    /// bound is undefined. Fails if a bound depends on the state. Several possible durations are supported only if
+    /// their lower bound is positive and there are no timed events.
     pub(super) fn lengths(&mut self, constraints: &'r [DurationConstraint]) -> Result<Option<Length>, Cause> {
         // Durations are never negative.
         let mut low: End = (BigRational::zero(), false);

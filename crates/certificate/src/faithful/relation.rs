@@ -39,8 +39,6 @@ impl Relation {
         }
     }
 
-    /// Iterates over the atoms of a predicate. `place` optionally restricts the argument at a
-    /// position to an object.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> impl Iterator<Item = &Key> {
         let rows = self.rows.get(&predicate).map_or(&[][..], Vec::as_slice);
         let (all, some) = match place {

@@ -42,7 +42,7 @@ pub enum Difference {
     /// The goal of the PDDL files does not imply the goal of the task.
     #[error("the goal of the files can hold where that of the task does not")]
     Goal,
-    /// An action instance can be executed, but no operator has its action and arguments.
+    /// An action instance may be executable, but no operator has its action and arguments.
     #[error("{instance}: no operator corresponds to it")]
     NoOperatorFor {
         /// The action with its arguments.
@@ -137,7 +137,6 @@ impl Cause {
         Self::Unsupported { construct: construct.into() }
     }
 
-    /// Adds to an unsupported construct in which part of the files it occurs.
     pub(super) fn within(self, part: &str) -> Self {
         match self {
             Self::Unsupported { construct } => Self::unsupported(format!("{construct}; it occurs in {part}")),

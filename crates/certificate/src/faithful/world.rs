@@ -190,7 +190,6 @@ impl<'w> World<'w> {
         Ok((self.symbol(&atom.predicate.name)?, objects.collect::<Result<_, _>>()?))
     }
 
-    /// Formats an atom or fluent in PDDL syntax, in lower case.
     pub(super) fn show(&self, key: &Key) -> String {
         match (key.0, &key.1[..]) {
             (PHASE, [number]) => return format!("(the phase phase {number})"),
@@ -203,7 +202,6 @@ impl<'w> World<'w> {
         format!("({})", words.join(" "))
     }
 
-    /// Formats an action instance.
     pub(super) fn call(&self, action: &Action, arguments: &[u32]) -> String {
         let words = arguments.iter().map(|object| self.name(*object));
         let words: Vec<&str> = std::iter::once(action.identifier.name.as_str()).chain(words).collect();

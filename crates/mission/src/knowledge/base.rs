@@ -134,7 +134,6 @@ impl Knowledge {
         self.terms.as_ref()
     }
 
-    /// Returns the asserted facts.
     pub(crate) fn stated(&self) -> Vec<Fact> {
         let engine = self.engine();
         match &self.stated {
@@ -271,7 +270,6 @@ impl Knowledge {
         Ok(delta)
     }
 
-    /// Returns the IRI of the individual to which this object name was given, ignoring case.
     fn called_so(&self, name: &str) -> Option<&str> {
         let is_so = |(_, own): &(&String, &String)| own.eq_ignore_ascii_case(name);
         self.called.iter().find(is_so).map(|(iri, _)| iri.as_str())
@@ -283,7 +281,6 @@ impl Knowledge {
         self.component_named(&self.component(name))
     }
 
-    /// Like [`Knowledge::known_component`], but without object names.
     fn component_named(&self, name: &str) -> Option<String> {
         let mut components =
             self.runtime.view().components().into_iter().map(|component| component.individual);

@@ -40,7 +40,6 @@ pub struct Stated {
     /// Assertions.
     pub facts: Vec<Fact>,
     pub(super) ontology: Ontology,
-    /// Rules of the rule files.
     pub(super) rules: Vec<Rule>,
     pub(super) equality: Equality,
     /// Number of rules, see [`crate::knowledge::Knowledge::rule_count`].

@@ -13,11 +13,10 @@ pub const VALUE_PROPERTIES: [&str; 2] = ["hasValue", "qa_has_value"];
 /// A condition of a rule on the value of an individual, which may be negated or in an aggregate.
 #[derive(Debug, Clone)]
 pub struct ValueRead {
-    /// Individual that has the value.
     holder: Term,
     /// The value. `None` if the condition is negated, or only requires that there is a measurement.
     pub value: Option<Term>,
-    /// `true` if the individual is an estimation of a design, so no measurement.
+    /// `true` if the individual is an estimation of a design, not a measurement.
     pub is_estimation: bool,
     /// Facts that the rule requires of the individual: property and attribute type.
     kinds: Vec<(Symbol, Symbol)>,
@@ -26,7 +25,7 @@ pub struct ValueRead {
 }
 
 impl ValueRead {
-    /// Returns `true` if the individual can be that of the measurement.
+    /// Returns `true` if this condition can read the value of the measurement.
     pub fn can_be(&self, measurement: &Measurement, engine: &Engine) -> bool {
         let symbols = engine.symbols();
         let iri = measurement.individual.iri.as_str();
@@ -40,9 +39,8 @@ impl ValueRead {
         }
     }
 
-    /// Returns `true` if the individual can be a measurement of an attribute for which no design has a requirement, and
-    /// which has no comparison operator. The attribute is given by IRI. The result may also be `true` if the individual
-    /// cannot.
+    /// Returns `true` if the individual may be a measurement of the attribute with this IRI. Assumes that no
+    /// design has a requirement for the attribute, and that the attribute has no comparison operator.
     fn can_measure(&self, attribute: &str, symbols: &Symbols) -> bool {
         let is_attribute = |kind: Symbol| symbols.value(kind).as_name() == Some(attribute);
         match self.holder {
@@ -66,8 +64,9 @@ pub(super) fn value_reads(engine: &Engine) -> Arc<[Vec<ValueRead>]> {
     engine.program().rules.iter().map(reads).collect()
 }
 
-/// Returns `true` if a rule or an axiom can read a measurement of an attribute for which no design has a requirement,
-/// and which has no comparison operator. The attribute is given by IRI. `reads` is the result of [`value_reads`].
+/// Returns `true` if a rule or an axiom may read a measurement of the attribute with this IRI. Assumes that no
+/// design has a requirement for the attribute, and that the attribute has no comparison operator. `reads` is
+/// the result of [`value_reads`].
 pub(super) fn is_read(engine: &Engine, reads: &[Vec<ValueRead>], attribute: &str) -> bool {
     let symbols = engine.symbols();
     engine.program().rules.iter().zip(reads).any(|(rule, reads)| {

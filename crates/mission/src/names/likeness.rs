@@ -89,8 +89,8 @@ fn key(name: &str) -> String {
     if name.chars().all(bare) { name.to_owned() } else { format!("\"{name}\"") }
 }
 
-/// Returns the length in bytes of the longest common ending of two names that consists of whole
-/// words.
+/// Returns the length in bytes of the longest common ending that follows a separator (`_` or `-`) in both
+/// names; 0 without such an ending.
 fn ending(one: &str, other: &str) -> usize {
     let mut common = 0;
     for ((at, a), (_, b)) in one.char_indices().rev().zip(other.char_indices().rev()) {

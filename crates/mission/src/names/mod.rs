@@ -1,10 +1,10 @@
 //! Names of the knowledge base and names of the problem: resolution of `[bindings.names]` and
 //! comparison of the two sets of names.
 //!
-//! An individual and an object are identical if they have the same name, or if `[bindings.names]`
-//! says so. Objects are compared only in *roles* that occur in a knowledge base: functions,
-//! designs, actions, and members of other classes to which a type of the domain is bound. A
-//! waypoint has no role, so the knowledge base need not contain it.
+//! An individual and an object are identical if they have the same name, or if `[bindings.names]` maps one to the
+//! other. Objects are compared only in *roles* that occur in a knowledge base: functions, designs, actions,
+//! components, and members of other classes to which a type of the domain is bound. A waypoint has no role, so the
+//! knowledge base need not contain it.
 
 mod likeness;
 mod meet;

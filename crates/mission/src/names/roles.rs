@@ -131,12 +131,10 @@ impl Role {
         }
     }
 
-    /// Returns `true` if an object of this name has the role.
     pub(super) fn has(&self, name: &Name) -> bool {
         self.objects.iter().any(|object| object.name == *name)
     }
 
-    /// Returns `true` if an individual of the role's class has this name.
     pub(super) fn knows(&self, name: &Name) -> bool {
         self.individuals.iter().any(|individual| Name::new(&individual.name) == *name)
     }

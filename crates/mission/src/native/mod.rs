@@ -8,11 +8,11 @@
 //! context, which is a predicate of the domain, applies only while this predicate holds for the action's
 //! parameters.
 //!
-//! A numeric function without parameters that is named like an estimated attribute, but is neither measured nor has
-//! an initial value, is replaced by the sum over the chosen designs. A function that is bound to `chosen:ATTRIBUTE`
-//! is replaced in the same way. A function that is bound to `reconfigured:ATTRIBUTE` is replaced by the sum over
-//! the newly chosen designs, i.e. those that replace another design of their function; the first design of a
-//! function is not counted.
+//! A numeric function without parameters that is named like an estimated attribute is replaced by the sum over the
+//! chosen designs, unless the attribute is measured or the function has an initial value. A function that is bound to
+//! `chosen:ATTRIBUTE` is replaced in the same way. A function that is bound to `reconfigured:ATTRIBUTE` is replaced
+//! by the sum over the newly chosen designs, i.e. those that replace another design of their function; the first
+//! design of a function is not counted.
 //!
 //! As in an explicit domain, the planner chooses the designs for these parameters without grounding them into actions,
 //! unless reconfiguration costs make the designs part of the state.
@@ -388,8 +388,8 @@ impl CoAdaptation {
         }
     }
 
-    /// Returns the effects that record the chosen design of each function and remove the previously
-    /// chosen one.
+    /// Returns the effects that record the chosen design of each function and remove the previously chosen one. Empty
+    /// if no function counts reconfigurations.
     fn starts(&self, designs: &[(Identifier, &Needed)]) -> Vec<Effect> {
         if self.changed.is_empty() {
             return Vec::new();

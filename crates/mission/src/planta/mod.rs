@@ -57,9 +57,9 @@ pub(crate) struct Planta {
 }
 
 impl Planta {
-    /// Completes a domain with types, constants, predicates and axioms from the knowledge base. Removes
-    /// objects of the problem that repeat constants with an undeclared type. Returns the translation state,
-    /// the completed domain, and warnings.
+    /// Completes a domain with types, constants, predicates and axioms from the knowledge base. Removes objects of
+    /// the problem that repeat a constant and have an undeclared type. Returns the translation state, the completed
+    /// domain, and warnings.
     pub(crate) fn new(
         terms: &Arc<Terms>,
         domain: &Domain,

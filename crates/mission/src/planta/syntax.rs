@@ -2,7 +2,6 @@
 
 use pddl::ast::{Atom, Condition, Declaration, Derived, Name, Span, Term, TypeExpression, TypedName};
 
-/// A ground fact: predicate and arguments.
 pub(super) type Fact = (Name, Vec<Name>);
 
 pub(super) fn variable(name: &str) -> Term {

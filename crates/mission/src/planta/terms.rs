@@ -145,7 +145,6 @@ impl Terms {
     }
 }
 
-/// Returns `true` for the IRIs of PLANTA's annotations, by which ontologies specify PDDL names.
 pub(super) fn is_annotation(iri: &str) -> bool {
     iri.starts_with(annotation::NS)
 }

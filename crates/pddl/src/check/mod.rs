@@ -109,7 +109,7 @@ struct Checker<'a> {
     sink: Sink<'a>,
     /// Undeclared predicates and functions `inferred-…`; PLANTA's `OWLToPDDL` would declare such predicates.
     undeclared_inferred: FxHashSet<&'a Name>,
-    /// A domain should use only its own constants, not objects of a problem.
+    /// `true` while a domain is checked. A domain should use only its own constants, not objects of a problem.
     in_domain: bool,
     in_durative_action: bool,
 }

@@ -21,7 +21,6 @@ pub(super) fn atom(atom: &Atom) -> Doc {
     list(atom.predicate.name.as_str(), 1, atom.arguments.iter().map(term))
 }
 
-/// Converts a number to a decimal, or to a quotient if its decimal expansion is infinite.
 pub(super) fn number(value: &BigRational) -> Doc {
     match to_decimal(value) {
         Some(decimal) => text(decimal),

@@ -147,8 +147,6 @@ impl Changes {
         change_facts(self.added, self.deleted, state);
     }
 
-    /// Returns `true` if applying the changes cannot alter the state: no fact changes, and each numeric
-    /// change adds 0.
     pub(super) fn is_neutral(&self) -> bool {
         let is_zero = |change: &Change| matches!(change, Change::Add(value) if value.is_zero());
         self.added.is_empty() && self.deleted.is_empty() && self.numeric.values().all(is_zero)

@@ -69,8 +69,6 @@ pub(super) struct Evaluator<'e, 'p> {
 }
 
 impl<'e, 'p> Evaluator<'e, 'p> {
-    /// Creates an evaluator for conditions outside of actions, where `?duration` and `total-time` are
-    /// undefined.
     pub(super) fn new(world: &'e World<'p>, state: &'e State) -> Self {
         Self { world, state, duration: None, total_time: None, ignored: None, trace: None }
     }

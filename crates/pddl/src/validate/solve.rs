@@ -83,7 +83,6 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         completed
     }
 
-    /// Declares the variables of a quantifier and binds each variable whose type has exactly one object.
     pub(super) fn declare(&self, variables: &'p [TypedName], bindings: &mut Bindings<'p>) {
         let first = bindings.0.len();
         bindings.declare(variables);

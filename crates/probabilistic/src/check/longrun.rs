@@ -191,7 +191,8 @@ fn reach_back<N: Number>(mdp: &Mdp<N>, set: &mut FixedBitSet) {
     }
 }
 
-/// For each state, the choices that lead to it. So a fixpoint needs not scan all states for each of its steps.
+/// For each state, the choices that lead to it. With this index, a step of a fixpoint iteration need not scan all
+/// states.
 struct Incoming {
     starts: Vec<usize>,
     choices: Vec<u32>,

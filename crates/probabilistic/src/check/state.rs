@@ -217,7 +217,7 @@ impl<N: Number> Query<'_, N> {
             let holds = match (left.ends(state), right.ends(state)) {
                 (Some((a, b)), Some((c, d))) => {
                     // A comparison is decided if it has the same result for all four pairs of ends of the two
-                    // intervals. For equality, the intervals must also be points or disjoint.
+                    // intervals. For equality, both intervals must also be points, or they must be disjoint.
                     let corners = [order(&a, &c), order(&a, &d), order(&b, &c), order(&b, &d)];
                     let equal = matches!(op, BinaryOp::Equal | BinaryOp::NotEqual) && (a != b || c != d);
                     let apart = b < c || d < a;

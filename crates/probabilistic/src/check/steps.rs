@@ -3,8 +3,8 @@
 use crate::number::{Number, count};
 use crate::solve::{Direction, Problem, Work};
 
-/// Underflow threshold: positive products below this value lose relative precision. The absolute error caused
-/// by such a loss is also less than the threshold.
+/// Underflow threshold: positive products below this value may lose relative precision. The absolute error caused by
+/// such a loss is less than the threshold.
 const UNDERFLOW_THRESHOLD: f64 = 1e-280;
 
 pub struct Stepped<N> {

@@ -1,9 +1,9 @@
 //! Caches the evaluated commands of a module for each of its local states. A local state consists of the values
 //! of the variables that the commands of the module read.
 //!
-//! A module has few local states, and each occurs in many states of the model. The commands of a local state
-//! are evaluated once. Their effects are stored as edits of the words of a packed state. The evaluated commands
-//! of a local state are called its behaviour.
+//! A module usually has few local states, and each occurs in many states of the model. The commands of a local state
+//! are evaluated once. Their effects are stored as edits of the words of a packed state. The evaluated commands of a
+//! local state are called its behaviour.
 
 use std::collections::BTreeSet;
 

@@ -1,8 +1,8 @@
 //! Typed expressions with resolved names, and their evaluation.
 //!
 //! Arithmetic is exact, so that `1 - 0.7 - 0.3` is zero even if the model is solved in doubles.
-//! Only irrational logarithms and powers, and very large powers, are approximated by doubles. The same holds for
-//! rational logarithms that are no integers.
+//! Approximated by doubles are logarithms that are not integers, irrational powers, and logarithms and powers
+//! beyond size limits.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -114,8 +114,8 @@ impl Code {
         })
     }
 
-    /// Evaluates a numeric expression. The result is exact, except for logarithms that are no integers,
-    /// irrational powers and very large powers.
+    /// Evaluates a numeric expression. The result is exact, except for the logarithms and powers listed in the
+    /// head of this file.
     pub fn number(&self, values: &[i64]) -> Result<BigRational> {
         Ok(match self {
             Self::Number(value) => value.clone(),

@@ -123,8 +123,8 @@ impl<'a> Cursor<'a> {
         if self.take_word(word) { Ok(()) } else { Err(self.expected(&format!("`{word}`"))) }
     }
 
-    /// Consumes an identifier that is not a keyword, and returns it with its position. Otherwise returns an error
-    /// with `description`, which says what is expected.
+    /// Consumes an identifier that is not a keyword, and returns it with its position. Otherwise returns an error;
+    /// `description` names the expected element.
     pub fn name(&mut self, description: &str) -> Read<(String, Place)> {
         let place = self.place();
         match self.peek() {

@@ -286,7 +286,6 @@ fn command(cursor: &mut Cursor<'_>) -> Read<Command> {
     Ok(Command { action, guard, updates, place })
 }
 
-/// Returns `true` if an update without a probability follows, i.e. the next tokens are `true;` or `(name'`.
 fn starts_assignments(cursor: &Cursor<'_>) -> bool {
     let is_true = cursor.is_word("true") && matches!(cursor.peek_at(1), Kind::Sign(";"));
     is_true || cursor.is("(") && matches!(cursor.peek_at(2), Kind::Sign("'"))

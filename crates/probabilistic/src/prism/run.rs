@@ -231,7 +231,6 @@ impl<N: Number> Program<N> {
         sum(&self.rewards[structure].states, values)
     }
 
-    /// Returns the number of items of a reward structure that define state rewards.
     pub(crate) fn state_reward_count(&self, structure: usize) -> usize {
         self.rewards[structure].states.len()
     }

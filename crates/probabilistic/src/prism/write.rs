@@ -109,8 +109,8 @@ fn operand(expression: &Expr, least: u8) -> String {
         ExprKind::Binary(op, left, right) => {
             let (sign, strength) = op.sign();
             let space = if strength <= 4 { " " } else { "" };
-            // Operators associate to the left. In PRISM, `=>` associates to the right since version 4.9, but not earlier,
-            // and not in Storm, so both of its operands get parentheses.
+            // Operators associate to the left. In PRISM, `=>` associates to the right since version 4.9, but not
+            // earlier, and not in Storm. So an implication as an operand of `=>` gets parentheses on both sides.
             let least_left = if *op == BinaryOp::Implies { strength + 1 } else { strength };
             let least_right = strength + 1;
             let (left, right) = (operand(left, least_left), operand(right, least_right));

@@ -41,8 +41,7 @@ pub fn certify<N: Number>(
         (0..quotient.choices.len()).map(|row| quotient.rows.apply(row, values).to_f64()).collect();
     let relative = rounding(quotient.widest);
     let row_error = |row: usize| relative * rows[row];
-    // Amount by which a row is worse than the computed value of its block; negative if rounding
-    // makes the row better.
+    // Amount by which a row is worse than the computed value of its block; negative if the row is better.
     let loss = |block: usize, row: usize| match direction {
         Direction::Min => rows[row] - v[block],
         Direction::Max => v[block] - rows[row],

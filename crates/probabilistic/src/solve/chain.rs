@@ -131,8 +131,8 @@ const MAX_ELIMINATION: u64 = 300_000_000;
 pub struct Solved<N> {
     /// Value (expected cost) of each state.
     pub values: Vec<N>,
-    /// Upper bound on the relative error of each value, if the entries of the rows were rounded at most twice.
-    /// Infinite if a product of probabilities may have underflowed; 0 in exact arithmetic.
+    /// Upper bound on the relative error of each value, including the rounding errors of the rows' entries. Infinite if
+    /// a product of probabilities may have underflowed; 0 in exact arithmetic.
     pub relative: Vec<f64>,
 }
 
@@ -280,8 +280,7 @@ fn eliminate<N: Number>(
         (0..dense(rows.len())).map(|state| Reverse((fill(&rows, &users, state), state))).collect();
     while let Some(Reverse((cost, pivot))) = queue.pop() {
         let p = pivot as usize;
-        // The queued cost is outdated if an elimination has changed the row of this state or the rows that use
-        // this state.
+        // An elimination may have increased the cost since it was queued.
         users[p].retain(|user| !done[*user as usize]);
         let current_cost = fill(&rows, &users, pivot);
         if current_cost > cost {

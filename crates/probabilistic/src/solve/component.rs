@@ -104,8 +104,7 @@ impl<N: Number> Run<'_, N> {
         unsure.into_iter().map(|unsure| !unsure).collect()
     }
 
-    /// Computes a policy under which the sure states (those marked in `members`) reach a terminal
-    /// state with probability 1.
+    /// Stores a policy for the states marked in `members` that reaches a terminal state with probability 1.
     fn reach_surely(&mut self, local: &mut Local<N>, members: &[bool]) {
         let sure = component_part(&local.states, members, true, true);
         if sure.is_empty() {
@@ -307,8 +306,8 @@ fn route_to_exits<N: Number>(
     }
 }
 
-/// Selects the sure states (those marked in `members`; they reach a terminal state with probability 1) if
-/// `only_sure`, otherwise all states if `include_sure`, otherwise the states that are not sure.
+/// Selects the states marked in `members` (the sure states) if `only_sure`, all states if only `include_sure`, and
+/// otherwise the states that are not marked.
 fn component_part(states: &[u32], members: &[bool], include_sure: bool, only_sure: bool) -> Vec<u32> {
     let is_selected = |sure: bool| if only_sure { sure } else { include_sure || !sure };
     states.iter().zip(members).filter(|(_, sure)| is_selected(**sure)).map(|(state, _)| *state).collect()

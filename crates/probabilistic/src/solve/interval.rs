@@ -1,12 +1,13 @@
 //! Interval iteration: bounds the values of components, for example if they are too large for elimination.
 //!
-//! The lower bound is iterated from zero. Its values are then increased a little. If no equation raises these
-//! values further, they are upper bounds, because end components are merged (optimistic value iteration:
-//! Hartmanns and Kaminski, CAV 2020; see also Haddad and Monmege, TCS 735, 2018).
+//! `enclose` iterates the lower bound from zero. Its values are then increased a little. If no equation raises
+//! these values further, they are upper bounds, because end components are merged (optimistic value iteration:
+//! Hartmanns and Kaminski, CAV 2020; see also Haddad and Monmege, TCS 735, 2018). `around` instead starts on
+//! both sides of approximate values.
 //!
-//! Each evaluation of an equation is rounded down for the lower bound and up for the upper bound. Therefore the
-//! values of the lower bound are valid at any time, in any order of the equations. Each sweep uses the values
-//! that it has already updated (Gauss-Seidel), and starts with blocks that are near an exit.
+//! Each evaluation of an equation is rounded down for the lower bound and up for the upper bound. Therefore an
+//! iteration from zero gives valid lower bounds at any time, in any order of the equations. Each sweep uses the
+//! values that it has already updated (Gauss-Seidel).
 
 use std::collections::VecDeque;
 
@@ -31,7 +32,8 @@ pub struct Enclosed<N> {
 const MAX_WORK: u64 = 30_000_000_000;
 /// Maximum number of sweeps within which a candidate bound has to be confirmed by the equations.
 const UPPER_SWEEPS: usize = 40;
-/// Distance of the initial bounds from approximate values, as a fraction of the required width.
+/// Distance of the initial bounds of [`around`] from the approximate values, as a fraction of the required
+/// width.
 const INITIAL_SHARE: f64 = 0.45;
 /// Maximum number of sweeps over the rows of a fixed policy between two sweeps over all rows.
 const POLICY_SWEEPS: usize = 25;
@@ -72,7 +74,7 @@ struct Rows<'a, N> {
     columns: &'a [u32],
     probabilities: &'a [N],
     constants: &'a [N],
-    /// Relative error of evaluating a row.
+    /// Upper bound on the relative rounding error of evaluating a row.
     rounding: f64,
 }
 
@@ -297,7 +299,7 @@ impl<'a, N: Number> Rows<'a, N> {
 
     /// Updates all values of a candidate lower bound in place. Results are multiplied by `scale` to account for
     /// rounding. Returns `true` if a value was lowered. If none was lowered, the values are lower bounds,
-    /// because further updates with the same rows would only raise them.
+    /// because further updates would only raise them.
     fn lowers(&self, values: &mut [f64], scale: f64) -> bool {
         let mut lowered = false;
         for position in 0..values.len() {
@@ -330,7 +332,6 @@ impl<'a, N: Number> Rows<'a, N> {
     }
 }
 
-/// Replaces a value. Returns its growth relative to the new value, or 0 if it did not grow.
 fn grow(old: &mut f64, new: f64) -> f64 {
     let change = if new > *old { (new - *old) / new } else { 0.0 };
     *old = new;

@@ -1,5 +1,5 @@
-//! Solves a problem on a Markov decision process: computes the value of each state with bounds, and an optimal
-//! policy.
+//! Solves a problem on a Markov decision process: computes an optimal policy and the value of each state. In
+//! doubles, it also bounds the errors of the values.
 //!
 //! The strongly connected components of the graph are solved in reverse topological order. The values of an
 //! acyclic part (e.g. a battery that is never recharged) therefore result from a single sweep. Inside a
@@ -11,7 +11,8 @@
 //!    TCS 735, 2018; for zero-reward end components: Bertsekas and Tsitsiklis, Math. OR 16(3),
 //!    1991).
 //! 3. Policy iteration solves the Markov chain of each policy directly.
-//! 4. In doubles, a certificate (`certify`) or another method (`doubles`) bounds the error of the result.
+//! 4. In doubles, the error of the result is bounded by a certificate (`certify`) or by another method
+//! (`doubles`).
 //!
 //! Small components of a simple form are solved by shortest paths instead (`ways`).
 
@@ -114,7 +115,6 @@ impl<N: Number> Run<'_, N> {
         visited.ok()
     }
 
-    /// Solves a terminal or blocked state: with rewards, the value of a blocked state is infinite.
     fn sink(&mut self, state: usize) {
         if self.problem.rewards.is_some() && !self.problem.terminal.contains(state) {
             self.solution.infinite.insert(state);
@@ -169,8 +169,8 @@ impl<N: Number> Run<'_, N> {
         }
         if let Some((value, choice, spread)) = best {
             if !N::EXACT {
-                // Values are never negative. So a least value of 0 has only the error of the selected choice. A greatest
-                // value of 0 may hide a choice whose value underflowed.
+                // Values are never negative. So a least value of 0 has only the error of the selected choice.
+                // A greatest value of 0 may result from a value that underflowed.
                 let is_least = self.problem.direction == Direction::Min && value.is_zero();
                 self.solution.errors[state] = if is_least { spread } else { error };
             }

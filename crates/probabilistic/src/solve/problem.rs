@@ -83,7 +83,7 @@ impl<N: Number> Problem<'_, N> {
     }
 }
 
-/// The values of all states, and a policy that attains them.
+/// The values of all states, and a policy that attains them. In doubles, both are approximate.
 #[derive(Debug, Clone)]
 pub struct Solution<N> {
     /// Value of each state; 0 if the value is infinite.
