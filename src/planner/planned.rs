@@ -19,7 +19,9 @@ pub(super) enum Ground {
     Integers(Task),
     Exact(ExactTask),
     /// Actions overlap. The metric's fluents in `not_minimised` were not minimised.
-    Concurrent { not_minimised: Vec<String> },
+    Concurrent {
+        not_minimised: Vec<String>,
+    },
 }
 
 /// Result of planning a mission.
