@@ -87,7 +87,7 @@ pub(super) struct Checkpoint {
     failures: Option<(PlannedStep, u32)>,
     plan: Option<VecDeque<PlannedStep>>,
     retry: Option<Retry>,
-    flags: [bool; 2],
+    flags: [bool; 3],
 }
 
 /// The adaptation loop of one robot.
@@ -302,7 +302,7 @@ impl Loop {
             failures: beliefs.failures.clone(),
             plan: beliefs.plan.clone(),
             retry: beliefs.retry,
-            flags: [beliefs.stuck, beliefs.reached],
+            flags: [beliefs.stuck, beliefs.reached, beliefs.unproved],
         }
     }
 
@@ -313,7 +313,7 @@ impl Loop {
         (beliefs.improvement_causes, beliefs.improvement_since) = to.improvement_causes;
         beliefs.failures = to.failures;
         (beliefs.plan, beliefs.retry) = (to.plan, to.retry);
-        [beliefs.stuck, beliefs.reached] = to.flags;
+        [beliefs.stuck, beliefs.reached, beliefs.unproved] = to.flags;
         self.planner.computed.clear();
     }
 

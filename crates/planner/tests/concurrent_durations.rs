@@ -129,6 +129,25 @@ fn as_much_is_charged_as_is_needed() {
     );
 }
 
+/// Auxiliary fluents that hold durations must not be confused with fluents of the domain.
+#[test]
+fn a_function_may_be_called_duration() {
+    for (function, objects) in [("duration ?a ?b", "of b"), ("chosen ?a ?b ?c", "duration of b")] {
+        let (name, _) = function.split_once(' ').unwrap();
+        let fluent = format!("({name} {objects})");
+        let domain = format!(
+            "(define (domain d) (:constants {objects}) (:predicates (g)) (:functions ({function}))
+               (:durative-action work :parameters () :duration (= ?duration 5) :condition (and)
+                 :effect (and (at start (increase {fluent} 1)) (at end (g)))))"
+        );
+        let problem = format!(
+            "(define (problem n) (:domain d) (:init (= {fluent} 0))
+               (:goal (and (g) (>= {fluent} 1))) (:metric minimize (total-time)))"
+        );
+        check(name, &domain, &problem, (Status::Optimal, Some("5"), &["0: (work) [5]"]));
+    }
+}
+
 #[test]
 fn consumption_at_the_start_counts() {
     // The fuel consumption is twice the duration; the tank has 9.

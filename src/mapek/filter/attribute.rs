@@ -281,7 +281,8 @@ impl AttributeFilter {
         Some(state.last_sample_time.unwrap_or(0).saturating_add(period).saturating_add(1))
     }
 
-    fn crossing_due(&self, state: &AttributeState) -> Option<Micros> {
+    /// Time at which the first change that is held will be believed.
+    pub(super) fn crossing_due(&self, state: &AttributeState) -> Option<Micros> {
         let crossings = self.bounds.iter().zip(&state.crossings);
         crossings.filter_map(|(bound, crossing)| self.confirmed_from(state, bound, crossing.as_ref()?)).min()
     }

@@ -165,7 +165,7 @@ impl Filters {
                         because: hold.word(),
                         held: state.held,
                         due: filter
-                            .due(state)
+                            .crossing_due(state)
                             .filter(|_| hold == attribute::Hold::Debounce)
                             .map(Duration::from_micros),
                     });

@@ -18,8 +18,7 @@ pub struct Catalogue {
     designs: Vec<FunctionDesign>,
     actions: Vec<Action>,
     measurements: Vec<Measurement>,
-    /// Members of each queried class. Shared by copies, which is safe because a change of a class
-    /// replaces the whole cache.
+    /// Members of each queried class. Shared by copies until a member of a class changes.
     classes: Arc<Mutex<BTreeMap<String, Arc<[Individual]>>>>,
 }
 
@@ -124,8 +123,11 @@ impl Catalogue {
             return true;
         }
         if OTHER_CLASSES.contains(&property) {
-            let classes = self.classes.lock().unwrap_or_else(PoisonError::into_inner);
-            return !classes.contains_key(property) && !classes.contains_key(local_name(property));
+            let classes = self.classes.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let is_queried = classes.contains_key(property) || classes.contains_key(local_name(property));
+            // Copies of this cache have other members of the class.
+            self.classes = Arc::new(Mutex::new(classes));
+            return !is_queried;
         }
         OTHERS.contains(&property)
     }

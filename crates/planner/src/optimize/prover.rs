@@ -24,6 +24,7 @@ const STAGES: Int = 8;
 #[derive(Default)]
 pub(super) struct Prover {
     stage: Option<Int>,
+    /// Number of steps up to which no plan is cheaper than the best known one; 0 if nothing is proved.
     pub(super) horizon: usize,
     /// Step bound of the formula that last raised the lower bound.
     pub(super) step_bound: usize,
@@ -55,7 +56,7 @@ impl Prover {
             let stage = *self.stage.get_or_insert(gap / STAGES);
             let limit = best.plan.below().min(best.lower.saturating_add(stage));
             let Ok(extent) = run.extent(bounds, limit, best) else { return ProverOutcome::Over };
-            self.horizon = self.horizon.max(extent.allowed.len());
+            let horizon = extent.allowed.len();
             if extent.step_bound.is_none() && stage < Int::MAX {
                 // Without a step bound, an unsatisfiable formula does not raise the lower bound. So the limit is
                 // not raised in stages: the formula admits all plans that are cheaper than the best one.
@@ -73,12 +74,16 @@ impl Prover {
                     best.lower = best.plan.cost.min(limit.saturating_add(1));
                     self.step_bound = step_bound;
                     if best.lower == best.plan.cost {
+                        self.horizon = horizon;
                         return ProverOutcome::Proved(Proof::Sat { step_bound });
                     }
-                    run.announce(best, self.horizon);
+                    run.announce(best, horizon);
                     self.stage = Some(stage.saturating_mul(2).max(1));
                 }
-                (StrategyOutcome::Exhausted, None) => return ProverOutcome::Over,
+                (StrategyOutcome::Exhausted, None) => {
+                    self.horizon = horizon;
+                    return ProverOutcome::Over;
+                }
                 (StrategyOutcome::Interrupted, _) if run.config.limits.reached() => {
                     return ProverOutcome::Over;
                 }

@@ -62,7 +62,7 @@ pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPl
     let horizon = extent.allowed.len();
     let is_small = must_confirm || extent.size() <= CONFIRM_SIZE && limit < CONFIRM_COST;
     if !is_small || extent.size() > FORMULA_LIMIT {
-        return into_solution(run, &best, horizon, by_search);
+        return into_solution(run, &best, 0, by_search);
     }
     let sat_outcome = within(&mut run, bounds, &extent, &mut best, allowance);
     if best.plan.cost <= limit {
@@ -71,13 +71,12 @@ pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPl
         );
     }
     // An unverified claim of an external program does not replace the proof by search.
-    let proof = match (sat_outcome, extent.step_bound) {
+    match (sat_outcome, extent.step_bound) {
         (StrategyOutcome::Exhausted, Some(step_bound)) if run.statistics.unchecked.is_none() => {
-            Some(Proof::Sat { step_bound })
+            into_solution(run, &best, horizon, Some(Proof::Sat { step_bound }))
         }
-        _ => by_search,
-    };
-    into_solution(run, &best, horizon, proof)
+        _ => into_solution(run, &best, 0, by_search),
+    }
 }
 
 /// Confirms with the SAT solver that a plan whose cost equals the lower bound is optimal. The formula is
@@ -111,10 +110,12 @@ fn confirm(run: &mut Run<'_>, incumbent: &GroundPlan) -> Option<Proof> {
 }
 
 pub(super) fn into_solution(run: Run<'_>, best: &Best, horizon: usize, proof: Option<Proof>) -> Solution {
-    let horizon = horizon.max(best.plan.steps.len());
     let plan = Some(&best.plan);
     match proof {
-        Some(proof) => run.finish(Status::Optimal, plan, Some(best.plan.cost), horizon, Some(proof)),
+        Some(proof) => {
+            let horizon = horizon.max(best.plan.steps.len());
+            run.finish(Status::Optimal, plan, Some(best.plan.cost), horizon, Some(proof))
+        }
         None => run.finish(Status::Feasible, plan, Some(best.lower), horizon, None),
     }
 }

@@ -13,8 +13,8 @@ use crate::number::dense;
 use pddl::ast::{self, Comparison, Direction, Name, Span};
 
 /// Prefix of the names of auxiliary numeric functions that hold chosen durations. Names in PDDL files contain
-/// no spaces, so there are no conflicts.
-pub const CHOSEN: &str = "chosen duration of ";
+/// no parentheses, so neither these names nor their ground names conflict with those of a domain.
+pub const CHOSEN: &str = "(chosen duration) of ";
 
 /// Returns `true` if the metrics that depend on `total-time` reward longer plans, and `false` if they reward
 /// shorter plans or none depends on it. Returns `None` if this cannot be determined or the metrics disagree.

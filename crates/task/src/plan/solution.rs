@@ -160,7 +160,8 @@ pub struct Solution {
     /// Bound on the metric: no plan has a better value. `None` if the metric may be unbounded or no bound is
     /// known.
     pub lower_bound: Option<Exact>,
-    /// Greatest number of steps of the plans that were considered, or 0 if the planner does not track this number.
+    /// Number of steps up to which formulas have excluded better plans; 0 if none was solved. For an optimal plan, at
+    /// least its number of steps.
     pub horizon: usize,
     /// Justification of the status.
     pub proof: Option<Proof>,

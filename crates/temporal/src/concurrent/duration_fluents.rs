@@ -16,10 +16,10 @@ use task::lifted::{
 use task::normalize::duration::CHOSEN;
 use task::number::dense;
 
-/// Prefix of the ground names of duration fluents. Names in PDDL files contain no blanks, so no
-/// clash is possible.
-pub(super) const DURATION_PREFIX: &str = "(duration of ";
-pub(super) const FLEXIBLE_DURATION_PREFIX: &str = "(chosen duration of ";
+/// Prefix of the ground names of duration fluents. No fluent of a domain has such a name: `(duration
+/// of b)` would be a function `duration` with the objects `of` and `b`.
+pub(super) const DURATION_PREFIX: &str = "((duration) of ";
+pub(super) const FLEXIBLE_DURATION_PREFIX: &str = "((chosen duration) of ";
 
 pub(super) fn depends_on_state(lifted: &Lifted, expression: &Expression) -> bool {
     let any = |parts: &[Expression]| parts.iter().any(|part| depends_on_state(lifted, part));
@@ -63,7 +63,7 @@ impl Timer {
             whole => (whole.clone(), None),
         };
         let function = FunctionId(dense(lifted.functions.len()));
-        let name = Name::new(&format!("duration of {}", schema.name));
+        let name = Name::new(&format!("(duration) of {}", schema.name));
         lifted.functions.push(Function { name, fluent: true, partial: true });
         Self { function, terms, numerator: Some(numerator), divisor }
     }
