@@ -205,7 +205,6 @@ struct FilledMission<'a> {
 }
 
 impl FilledMission<'_> {
-    /// Returns the remaining time as a limit.
     fn remaining(&self) -> Limits {
         Limits::none().with_time(self.manner.time_limit.saturating_sub(self.start.elapsed()))
     }

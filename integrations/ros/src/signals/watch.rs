@@ -103,7 +103,8 @@ impl Samples {
     }
 }
 
-/// Reads the last message of a topic if it was skipped. Does nothing if no message is skipped.
+/// Periodically reads the last message of a topic if it was skipped. Returns `None` if `every` is zero: then no
+/// message is skipped.
 fn watch_skipped(
     clock: Arc<Clock>,
     samples: &Arc<Mutex<Samples>>,
