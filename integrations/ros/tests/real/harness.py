@@ -40,7 +40,7 @@ PROGRAM = pathlib.Path(sys.argv[1]).resolve()
 
 
 class Failure(AssertionError):
-    """What a scenario has found."""
+    """A failed check of a scenario."""
 
 
 def check(found: object, expected: object, what: str) -> None:

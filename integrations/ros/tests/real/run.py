@@ -4,7 +4,7 @@
     python run.py METAPLAN_ROS --cold-starts N
 
 The second form starts each role N times, with a new client each time; it is not part of CI. Each scenario uses a ROS domain
-of its own and starts the program anew. Exits with 1 if a scenario fails.
+of its own and starts a new process of the program. Exits with 1 if a scenario fails.
 """
 
 import functools
