@@ -1,12 +1,12 @@
-"""Which mode is right for each function of SUAVE, and what was asked for instead.
+"""Determines the right mode of each function of SUAVE, and finds wrong requests.
 
-The definitions (SUAVE's knowledge base and exemplar): the three spirals need a water visibility of at least 3.25,
-2.25 and 1.25 m, and the higher one is the better one; all thrusters are used while none has failed, and recovered
-otherwise; with a quarter of the battery or less the robot recharges before it does anything else.
+The definitions (SUAVE's knowledge base and exemplar): the three spirals need a water visibility of at least 3.25, 2.25
+and 1.25 m, and a higher one is better; all thrusters are used while none has failed, and recovered otherwise; at a
+quarter of the battery or less the robot recharges before anything else.
 
-Assumed, where the definitions are silent: below 1.25 m no spiral is right, and SUAVE's managers then either keep the
-running one (as MROS does: its plan is empty) or unground the function; both are accepted, nothing is demanded. A
-function that the task does not need may be ungrounded once more, or not be mentioned.
+An assumption, because the definitions do not say it: below 1.25 m no spiral is right, and SUAVE's managers then either
+keep the running one (as MROS does: its plan is empty) or unground the function; both are accepted, and nothing is
+required. A function that the task does not need may be ungrounded again, or get no request.
 """
 
 from __future__ import annotations

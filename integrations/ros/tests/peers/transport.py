@@ -1,6 +1,6 @@
-"""What every DDS library has to do for a peer: CDR octets in and out, and who asked for what.
+"""The interface of a DDS library for a peer: CDR octets in both directions, and the identification of requests.
 
-Octets always carry the encapsulation header. `key` identifies a request; only its transport knows what is in it.
+Octets always include the encapsulation header. `key` identifies a request; its content is private to the transport.
 """
 
 from __future__ import annotations
