@@ -63,7 +63,6 @@ fn scripts(count: usize, lines: usize) -> Vec<Script> {
     (0..count.min(24)).map(script).collect()
 }
 
-/// Starts servers and workers.
 async fn begin(seed: u64, workers: usize, lease: u64) -> (Cluster, Nats) {
     let cluster = Cluster::begin(seed);
     let access = Access { url: cluster.url(), ..Access::default() };

@@ -40,7 +40,6 @@ pub(super) fn shared<S: Store>(store: S, name: &str, settings: Settings) -> Arc<
     Arc::new(Shared::new(store, MISSIONS.clone(), name.to_owned(), settings))
 }
 
-/// Waits until a condition holds.
 pub(super) async fn until(what: &str, mut holds: impl AsyncFnMut() -> bool) {
     let begun = Instant::now();
     while !holds().await {
