@@ -84,7 +84,6 @@ fn show(report: &Verification, format: Format) -> u8 {
     }
 }
 
-/// Prints errors: as text on standard error, or as one JSON object on standard output.
 fn fail(messages: &[Message], format: Format) {
     match format {
         Format::Text => {

@@ -298,7 +298,6 @@ impl Robot {
         if let Control::Loaded(control, _) = &self.control { control.question() } else { 0 }
     }
 
-    /// Plans without a search, if that is possible.
     fn deliberate(&mut self, mut search: Search) -> Begun {
         if let Control::Loaded(control, _) = &mut self.control {
             let Some(answers) = control.deliberate_at_once() else { return Begun::Search(search) };

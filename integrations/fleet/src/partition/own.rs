@@ -141,7 +141,8 @@ impl<S: Store> Partition<S> {
         });
     }
 
-    /// Registers that a robot has become idle.
+    /// Starts a runner again that has events, and forgets the robot of an obsolete one. Otherwise, the robot becomes
+    /// idle.
     fn rest(&mut self, runner: Option<Box<Runner<S>>>) {
         let Some(runner) = runner else { return };
         let name = &runner.address.robot;

@@ -18,7 +18,6 @@ use crate::wire::{Address, Decided};
 /// Reason for a suspension: work on the robot has panicked, or the thread of a search could not be started.
 const PANICKED: &str = "its loop has panicked";
 
-/// Increments a counter on creation, and decrements it when dropped.
 pub(super) struct Count(Arc<AtomicU64>);
 
 impl Count {
@@ -463,7 +462,6 @@ async fn until(time: Option<Instant>) {
     }
 }
 
-/// Waits until the partition is given back.
 async fn drained(drain: &mut watch::Receiver<bool>) {
     if drain.wait_for(|is_draining| *is_draining).await.is_err() {
         // The runner is dropped together with the sender.

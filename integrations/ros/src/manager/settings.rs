@@ -97,7 +97,6 @@ pub struct TaskSettings {
     pub facts: BTreeMap<String, toml::Value>,
 }
 
-/// Returns the value of a fact as the text of an event.
 pub(super) fn fact_value(value: &toml::Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }

@@ -93,7 +93,6 @@ impl Procedures {
         self.functions.get(function).is_some_and(|procedures| procedures.conditions().next().is_none())
     }
 
-    /// Returns the nodes whose state or parameters show the mode of a function.
     pub(crate) fn nodes(&self, function: &str) -> BTreeSet<String> {
         let conditions = self.functions.get(function).into_iter().flat_map(FunctionProcedures::conditions);
         let node = |condition| match condition {

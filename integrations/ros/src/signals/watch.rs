@@ -140,7 +140,6 @@ struct Reporter {
 }
 
 impl Reporter {
-    /// Reports whether the component works. Does nothing if the signal measures an attribute.
     fn works(&self, works: bool) {
         if let Target::Component { component, .. } = &self.target {
             self.send(COMPONENT, component, if works { "TRUE" } else { "FALSE" }.to_owned());
