@@ -139,8 +139,7 @@ def test_systemd_has_no_complaint_of_the_unit(tmp_path):
 
 
 def metrics_in(text):
-    """Returns the metrics in a text, without `_sum` and `_count`, which the exporter adds to a histogram (rendered as a
-    summary)."""
+    """Returns the metrics in a text, without the suffixes `_sum` and `_count` that the exporter adds to histograms."""
     names = set()
     for name in re.findall(r"\bmetaplan_fleet_\w+", text):
         base = re.sub(r"_(sum|count)$", "", name)

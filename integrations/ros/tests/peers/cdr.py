@@ -55,7 +55,7 @@ class Rust:
 
 
 def value_of(description: Any, types: Any, draw: random.Random, plain: bool) -> Any:
-    """Returns a random value. With `plain`, no string or sequence is long."""
+    """Returns a random value. With `plain`, its strings are short."""
     kind, detail = int(description[0]), description[1]
     if kind == codec.NAME:
         return {name: value_of(field, types, draw, plain) for name, field in codec.fields(detail, types)}

@@ -33,8 +33,7 @@ def timeout_of(node: Node, name: str) -> float:
 
 @scenario()
 def graph(setting: Setting) -> str:
-    """`ros2 node list`, `ros2 lifecycle get` and `ros2 param list` show the program, which publishes plans and
-    events."""
+    """`ros2 node list`, `ros2 lifecycle get` and `ros2 param list` show the program. It publishes plans and events."""
     with play(setting) as (robot, _):
         node, plans, logs, about = robot.node, [], [], []
         node.subscribe("/metaplan/plan", STRING, lambda message: plans.append(message.data))

@@ -39,8 +39,7 @@ def _parts(text: str, count: int) -> list[str]:
 
 
 def _texts(variant: str | None) -> dict[str, str]:
-    """Returns the texts of all types as messages, including the messages that ROS generates for services and
-    actions."""
+    """Returns the texts of all types as messages, including those that ROS generates for services and actions."""
     changed = CORRECTED | VARIANTS.get(variant or "", {})
     texts = {name: changed.get(name, text) for name, text in MESSAGES.items()}
     texts |= {name: text for name, text in changed.items() if "/msg/" in name}

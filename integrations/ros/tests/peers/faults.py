@@ -37,8 +37,7 @@ def battery(setting: Setting) -> str:
 
 @scenario()
 def refuses(setting: Setting) -> str:
-    """A design is refused: the program selects the next best one and does not repeat the refused request without
-    end."""
+    """A design is refused: the program selects the next best one, and soon stops to request the refused one."""
     with play(setting) as (robot, _):
         robot.modes.faults.refuses = {"fd_spiral_high"}
         robot.oracle.world.refused = {"fd_spiral_high"}
@@ -238,8 +237,7 @@ def _again(robot: Robot) -> bool:
 
 
 def _remote(setting: Setting, part: Callable[[Remote, Robot], None], limit: float) -> str:
-    """The mode manager is a separate process that ends and returns with all functions ungrounded; the mission
-    continues."""
+    """The mode manager ends and returns as a new process, with all functions ungrounded; the mission continues."""
     program = Program(setting.program, "manager", setting.vendor, setting.domain)
     setting.programs.append(program)
     modes = Remote(setting.vendor, setting.domain)
@@ -297,7 +295,7 @@ def restarts(setting: Setting) -> str:
 
 @scenario()
 def wrong_mapping(setting: Setting) -> str:
-    """The service mapping of the other vendor is forced: calls time out, and the program reports the mapping in use."""
+    """The service mapping of the other vendor is forced: calls time out, and the program names the right `--rmw`."""
     other = "fastrtps" if setting.vendor == "cyclonedds" else "cyclonedds"
     program = Program(setting.program, "manager", setting.vendor, setting.domain, rmw=other)
     setting.programs.append(program)
@@ -317,8 +315,7 @@ def wrong_mapping(setting: Setting) -> str:
 
 @scenario()
 def rubbish_requests(setting: Setting) -> str:
-    """Services of the program get invalid requests from clients that do not wait; the other clients are still
-    served."""
+    """Services get invalid requests from clients that do not wait. The other clients are still served."""
     rubbish = [
         b"\x00\x01\x00\x00" + body for body in (b"", b"\xff" * 8, b"\xff\xff\xff\x7f", bytes(range(64)), b"\x01" * 3)
     ]

@@ -1,5 +1,4 @@
-"""Nodes that perform the actions of a plan: a PlanSys2 performer on `actions_hub`, Nav2's server, PlanSys2's
-executor."""
+"""Nodes that perform actions of a plan: a PlanSys2 performer on `actions_hub`, Nav2's server, PlanSys2's executor."""
 
 from __future__ import annotations
 

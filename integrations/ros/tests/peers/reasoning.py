@@ -16,8 +16,7 @@ from transport import connect
 
 @scenario()
 def objectives(setting: Setting) -> str:
-    """Feedback reports the design of each objective. An objective is cancelled only if its function can be
-    ungrounded."""
+    """Feedback reports the design of each objective. A cancellation fails if the function cannot be ungrounded."""
     with play(setting, "reasoner") as (robot, _):
         see(robot, CLEAR)
         check(robot.request(SEARCH), "an objective was not accepted")

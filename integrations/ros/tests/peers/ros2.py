@@ -53,7 +53,7 @@ class Publisher:
 
 @dataclass
 class Call:
-    """A pending request. `value` is set when `done`; `failed` is the reason why an answer cannot be read."""
+    """A pending request. When it is `done`, `value` is the answer, or `failed` is the reason why it is unreadable."""
 
     done: bool = False
     value: Any = None
@@ -140,7 +140,7 @@ class Node:
         return Client(self, name, type_name)
 
     def serve(self, name: str, type_name: str, handler: Callable[[Any], dict[str, Any] | bytes | Later | None]) -> Any:
-        """Serves: a dictionary is the answer, octets are sent as they are, `None` is silence."""
+        """Serves requests. A dictionary is encoded, octets are sent unchanged, and `None` sends no answer."""
 
         def send(key: Any, value: dict[str, Any]) -> None:
             replier.reply(key, codec.encode(f"{type_name}_Response", value))

@@ -32,8 +32,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class Stimulus:
-    """The report of a monitor `second` seconds after GUIDED: `visibility` (m), `battery` (share) or `failure`
-    (thruster)."""
+    """A report `second` seconds after GUIDED: `visibility` (m), `battery` (share) or `failure` (thruster)."""
 
     second: float
     kind: str

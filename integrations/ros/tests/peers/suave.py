@@ -59,8 +59,7 @@ class Monitors:
         self._send([self._status(OK, name, "QA status", [("battery_level", str(share))])], stamp)
 
     def thruster(self, number: int, works: bool, stamp: dict[str, int]) -> None:
-        """Publishes the state of a thruster as thruster_monitor does: Metacontrol's and PLANTA's words have the same
-        key."""
+        """Publishes a thruster's state like thruster_monitor: Metacontrol's and PLANTA's words have the same key."""
         level, words = (OK, ("RECOVERED", "OK")) if works else (ERROR, ("FALSE", "ERROR"))
         values = [(f"c_thruster_{number}", word) for word in words]
         self._send([self._status(level, "thruster_monitor: Thruster status", "Component status", values)], stamp)
@@ -177,7 +176,7 @@ class Robot:
         return done
 
     def request(self, task: str) -> bool:
-        """Requests a task as the mission node. Returns `True` if it was granted within five seconds."""
+        """Requests a task as the mission node. Returns `True` if it was granted in time."""
         self.oracle.world.task = task
         self.oracle.stimulus(f"request of {task}", time.time())
         if self.objectives is not None:
@@ -191,7 +190,7 @@ class Robot:
         return granted
 
     def cancel(self, task: str) -> bool:
-        """Ends a task as the mission node. Returns `True` if this was confirmed within five seconds."""
+        """Ends a task as the mission node. Returns `True` if this was confirmed in time."""
         self.oracle.world.task = None
         self.oracle.stimulus(f"cancellation of {task}", time.time())
         if self.objectives is not None:

@@ -1,4 +1,4 @@
-"""Mean reaction times of other managers in SUAVE, as published, beside those of a run of ours.
+"""Compares the published mean reaction times of other managers in SUAVE with those of our runs.
 
     python table.py ../shared/real/suave_results report.json
 
