@@ -89,9 +89,10 @@ pub fn check(
     }
 }
 
-/// Writes and verifies a certificate of a front, which must be complete unless `is_wrong`. Then verifies false fronts
-/// that are made of the files of this certificate. They must all be rejected. With the environment variable
-/// `ORACLE_FRONTS`, all certificates are saved in this directory, false ones in folders named `false`.
+/// Writes and verifies a certificate of a front. The front must be complete unless `is_wrong`, and then the
+/// verification must fail. From the files of a complete front, makes and verifies false fronts, which must all be
+/// rejected. With the environment variable `ORACLE_FRONTS`, all certificates are saved in this directory: the first
+/// one in a folder `true`, even if the front is wrong, and the others in folders `false-N`.
 pub fn check_front(
     case: &Case,
     (mission, problem): (&Mission, &Problem),

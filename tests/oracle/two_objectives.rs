@@ -31,7 +31,7 @@ struct Courier {
     fuel: u32,
     /// Moves take time, and the first objective is the total time.
     is_timed: bool,
-    /// The limited objective is the first one.
+    /// The planner gets the objectives in the order (risk), first objective.
     is_exchanged: bool,
 }
 

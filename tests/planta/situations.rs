@@ -84,7 +84,8 @@ fn further_situations_have_the_state_space_of_their_export() {
     compare_with_export(None, Some("1.5"));
 }
 
-/// Explores the narrowed and the exported problem of a situation, and compares their sizes.
+/// Explores the narrowed and the exported problem of a situation, and compares their transitions and the
+/// lengths of their best plans.
 fn compare_with_export(failed_component: Option<&str>, visibility: Option<&str>) {
     let Some(real) = real() else { return };
     let input = extended(&real);

@@ -64,7 +64,8 @@ fn rust_files(directory: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// Returns all Rust files of the workspace: path relative to the workspace root, and text.
+/// Returns the Rust files of the workspace without its folder `examples`: path relative to the workspace root, and
+/// text.
 fn files() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = Vec::new();
@@ -84,7 +85,7 @@ fn check(rule: &str, offends: impl Fn(&str, &str) -> Vec<String>) {
     assert!(offenders.is_empty(), "{rule}:\n{}", offenders.join("\n"));
 }
 
-/// Returns the library code of a file, without tests. `None` if the file is not part of a library.
+/// Returns the code of a file without tests. `None` if the file does not belong to one of the checked libraries.
 fn library_part<'a>(path: &str, text: &'a str) -> Option<&'a str> {
     let library = [
         "src/",

@@ -289,8 +289,8 @@ fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> M
     }
 }
 
-/// Finds a free rectangle for a text near a point, at the distance `reach`, and marks it as
-/// occupied. No line crosses it if possible. Returns the left end of the base line, or `None` if no
+/// Finds a free rectangle for a text near a point, at the distance `reach` or a little farther, and marks it
+/// as occupied. No line crosses it if possible. Returns the left end of the base line, or `None` if no
 /// position is free.
 fn room(
     (x, y): Point,

@@ -99,7 +99,7 @@ impl<'a> Verifier<'a> {
         report
     }
 
-    /// Returns the report of a certificate whose files are as its manifest states.
+    /// Creates the report of a certificate whose files match its manifest.
     fn report(&self, claim: Claim, files: &[File]) -> Verification {
         let mission = self.mission.map(|mission| mission.name.as_str());
         let bytes: u64 = files.iter().map(|file| file.bytes).sum();
@@ -111,7 +111,7 @@ impl<'a> Verifier<'a> {
         }
     }
 
-    /// Compares the certificate with the mission, if there is one.
+    /// Compares the certificate with the mission. Returns `None` without a mission.
     fn about_mission(&self, contents: &[(String, String)]) -> Option<VerifiedPart> {
         let texts = (text(contents, DOMAIN), text(contents, PROBLEM));
         let result = about(written(contents).as_ref(), texts, self.mission?);

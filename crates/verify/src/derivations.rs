@@ -1,5 +1,5 @@
-//! The JSON format of derivations: all facts of a mission's knowledge, the inferred ones with their
-//! derivations. `rules::replay` checks them without code of the inference engine.
+//! JSON format of derivations: all facts of a mission's knowledge base, and a derivation of each inferred
+//! fact. `rules::replay` checks the derivations without running the inference engine.
 
 use rules::{Derivation, DerivationStep, Fact, Literal, Reason, RuleIdentity, Symbol, Symbols};
 use serde::{Deserialize, Serialize};

@@ -22,7 +22,6 @@ const MANIFEST_LIMIT: u64 = 1 << 20;
 /// Names and texts of files.
 pub(crate) type Contents = Vec<(String, String)>;
 
-/// Returns `true` if the manifest in `directory` states the format of fronts.
 pub(crate) fn is_front(directory: &Path) -> bool {
     #[derive(serde::Deserialize)]
     struct Format {

@@ -144,7 +144,7 @@ pub(crate) fn check(
     results
 }
 
-/// Parses the objectives of a front.
+/// Parses the objectives. Rejects a second objective that no goal can limit.
 fn objectives(front: &Front, domain: &Domain, problem: &Problem) -> Result<[Metric; 2], String> {
     let objective = |text: &String| {
         let metric = read_objective(Direction::Minimize, &Source::new(FRONT, text.as_str()), domain, problem);

@@ -49,9 +49,9 @@ pub(crate) struct KnowledgeFiles<'w> {
     pub(crate) derivations: &'w str,
 }
 
-/// Replays the derivations, and fills the mission's problem with the inferred facts. The result
-/// must equal `problem`, the problem of the certificate, except for the metric; the mission's
-/// domain must equal `domain`. Returns the results of both checks.
+/// Replays the derivations, and fills the mission's problem with the inferred facts. The filled problem must
+/// equal `problem`, the problem of the certificate, except for the metric. The mission's domain must equal
+/// `domain`. Returns the results of the replay and of the comparison.
 pub(crate) fn check(
     written: &KnowledgeFiles<'_>,
     domain: &Domain,
@@ -64,7 +64,6 @@ pub(crate) fn check(
     [Ok(summary), filled(knowledge, &origin, domain, problem)]
 }
 
-/// Code of the message about an import that is not found.
 const MISSING_IMPORT: &str = "O103";
 
 /// Returns `true` if a rule file equals the shipped rule file with this name.
@@ -171,8 +170,7 @@ fn replayed(written: &KnowledgeFiles<'_>) -> Result<(Knowledge, String, Origin),
     Ok((knowledge, summary, origin))
 }
 
-/// Names the code between knowledge and PDDL that verifier and planner share, and that must be
-/// trusted.
+/// Describes the trusted translation from knowledge to PDDL, whose code the planner uses, too.
 fn shared(mission: &Mission) -> &'static str {
     match (mission.adaptation(), mission.completed_predicates()) {
         (Some(_), _) => "the bindings, and the explicit form of the plain domain",

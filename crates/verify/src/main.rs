@@ -84,7 +84,6 @@ fn show(report: &Verification, format: Format) -> u8 {
     }
 }
 
-/// Prints an error: as text on standard error, or as a JSON object on standard output.
 fn fail(messages: &[Message], format: Format) {
     match format {
         Format::Text => {

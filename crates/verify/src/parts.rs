@@ -19,7 +19,7 @@ use crate::{derivations, knowledge};
 /// Reason for the rejection of a manifest that claims more than a single certificate can prove.
 pub(crate) const MISPLACED: &str = "the manifest of a single certificate claims a front";
 
-/// Checks all parts of a certificate except its files.
+/// Checks the parts of a certificate whose files match its manifest.
 pub(crate) fn parts(
     directory: &Path,
     manifest: &Manifest,
@@ -90,7 +90,6 @@ pub(crate) fn origin_parts(
     ]
 }
 
-/// Returns the files of the knowledge base, if the certificate has one.
 pub(crate) fn written(contents: &[(String, String)]) -> Option<knowledge::KnowledgeFiles<'_>> {
     contents.iter().any(|(name, _)| name == knowledge::ORIGIN).then(|| knowledge::KnowledgeFiles {
         document: text(contents, knowledge::DOCUMENT),

@@ -45,7 +45,6 @@ impl Health {
         self.state(|state| (state.round, state.is_draining) = (Some(Instant::now()), is_draining));
     }
 
-    /// Records a response of the log, which counts as reachable for the duration `valid`.
     pub(crate) fn reach(&self, valid: Duration) {
         self.state(|state| state.contact = Some((Instant::now(), valid)));
     }

@@ -19,14 +19,14 @@ const MAX_RANGES: usize = 16;
 
 const MAX_LENGTH: usize = 128;
 
-/// Set of message ids, of which it forgets some.
+/// Set of message ids. Texts without recent insertions are dropped, and low numbers are merged.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ids(Vec<Session>);
 
 /// Membership of an id in [`Ids`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Membership {
-    /// The id was not inserted, or is forgotten with its text.
+    /// The id was not inserted, or was dropped with its text.
     Absent,
     /// The id was inserted.
     Present,
@@ -80,7 +80,7 @@ impl Ids {
         self.0.is_empty()
     }
 
-    /// Returns whether the set contains an id.
+    /// Returns the membership of an id.
     pub fn membership(&self, id: &str) -> Membership {
         let (text, number) = split(id);
         let text = stored_text(text);

@@ -7,9 +7,10 @@
 //! [loops](metaplan::mapek::Loop) of their robots.
 //!
 //! Every event that is not refused leads to exactly one decision, unless the robot is suspended because it cannot
-//! continue. A decision is appended only if the robot's previous decision is still the last one (compare-and-set on the
-//! last sequence of the subject). So two workers that own a partition at the same time cannot both decide an event: the
-//! division of partitions is for efficiency, and the chain of decisions guarantees correctness.
+//! continue. A further decision may add the plan. A decision is appended only if the robot's previous decision is
+//! still the last one (compare-and-set on the last sequence of the subject). So two workers that own a partition at
+//! the same time cannot both decide an event: the division of partitions is for efficiency, and the chain of
+//! decisions guarantees correctness.
 //!
 //! ```
 #![doc = include_str!("../examples/directory.rs")]
@@ -22,7 +23,7 @@
 //! - [`partition`]: the robots of a partition: order, loading, discarding of handled events.
 //! - [`worker`]: division of partitions among workers, metrics, shutdown.
 //! - [`health`]: state of a worker for liveness and readiness probes.
-//! - [`robots`](mod@robots): clients: append events, follow decisions, query the fleet.
+//! - [`robots`](mod@robots): clients: append events, query the fleet.
 
 pub mod health;
 pub mod ids;

@@ -227,7 +227,7 @@ pub(crate) async fn up(
 }
 
 /// Returns the warning for a notice, or for notices that were lost because standard error was not read in time.
-/// Returns `None` if there are no further ones.
+/// Returns `None` after the last notice.
 fn warning(received: Result<(String, String), RecvError>) -> Option<Message> {
     let text = match received {
         Ok((subject, text)) => {
@@ -244,7 +244,7 @@ fn warning(received: Result<(String, String), RecvError>) -> Option<Message> {
 
 /// Returns `true` if all stored events are decided, refused, or of a suspended robot, and all decisions are written.
 async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) -> Result<bool, Message> {
-    // Events come first: their decisions are stored when they are decided.
+    // Events are checked first: once all of them are handled, their decisions are stored.
     for (stream, positions) in [(Stream::Events, &shared.counts.reached), (Stream::Decisions, written)] {
         for partition in 0..shared.store.partitions() {
             let end = shared.store.end(stream, partition).await.map_err(fault)?;

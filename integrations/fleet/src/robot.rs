@@ -1,6 +1,7 @@
 //! State of a single robot, which turns an event into a decision. It has no network and takes the time from the
-//! events. So equal events at equal times lead to equal decisions of [`Robot::decide`], except for plans whose search
-//! was ended by a time limit. Other decisions also depend on which plans were found before an event.
+//! events. Equal events at equal times therefore lead to equal decisions of [`Robot::decide`], except for plans whose
+//! search was ended by a time limit. Decisions of [`Robot::finish`] and [`Robot::plan`] also depend on the plans that
+//! their caller provides.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -21,7 +22,7 @@ pub struct Robot {
     pub event: u64,
     /// Time between enrolment and the last event that was decided, in microseconds.
     now: u64,
-    /// State after the last decision. The snapshot is that of a loop that is not loaded yet.
+    /// State after the last decision. Its snapshot is used only while the loop is [`Control::Stored`].
     state: State,
     control: Control,
 }
@@ -61,8 +62,8 @@ pub enum Refused {
     /// An event with the same message id was decided before.
     #[error("an event with this message id was decided before")]
     Repeated,
-    /// The number of the message id lies between numbers of decided events that are so low that the numbers between them
-    /// are not stored.
+    /// The number of the message id lies in a merged range, so a decision about the event is possible, but not recorded; see
+    /// [`Membership::Unclear`].
     #[error(
         "the event is too late: so many events with higher numbers were decided before it that whether it was decided, \
          too, is not stored"
@@ -297,7 +298,6 @@ impl Robot {
         if let Control::Loaded(control, _) = &self.control { control.question() } else { 0 }
     }
 
-    /// Plans without a search, if that is possible.
     fn deliberate(&mut self, mut search: Search) -> Begun {
         if let Control::Loaded(control, _) = &mut self.control {
             let Some(answers) = control.deliberate_at_once() else { return Begun::Search(search) };
@@ -307,8 +307,8 @@ impl Robot {
     }
 
     /// Changes to another version of the mission if this was requested, the version is available, and the loop is at
-    /// the requested point. Returns `true` if the robot has changed; the new loop then has to plan. If the version does
-    /// not fit, an error becomes an answer, and the request is dropped.
+    /// the requested point. Returns `true` if the version has changed; the new loop then has to plan. If the state
+    /// does not fit the version, an error becomes an answer, and the request is dropped.
     fn migrate(&mut self, name: &str, missions: &Missions, search: &mut Search) -> Result<bool, Undecided> {
         let (Some(migration), Control::Loaded(control, _)) = (&self.state.migration, &self.control) else {
             return Ok(false);

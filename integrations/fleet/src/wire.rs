@@ -18,7 +18,7 @@ pub enum Format {
 
 const LONGEST_NAME: usize = 64;
 
-/// Returns `true` if a text is a valid name of a robot: 1 to 64 letters, digits, `-` and `_`, so
+/// Returns `true` if a text is a valid name of a robot, a worker or a fleet: 1 to 64 letters, digits, `-` and `_`, so
 /// that the name can be part of a subject.
 pub fn is_name(name: &str) -> bool {
     !name.is_empty()
@@ -172,7 +172,7 @@ pub enum SafePoint {
     /// The end of the action under way, or at once between actions.
     #[default]
     ActionEnd,
-    /// The first event after the robot has reached its goal.
+    /// The first event after which the goal is reached and no action runs.
     Goal,
 }
 

@@ -1,8 +1,8 @@
 //! A worker: runs its share of the partitions.
 //!
-//! Each worker publishes its status, which expires unless it is published again. All workers with a status, except those
-//! that are shutting down, share the partitions by a function of their names (`owners`). The workers need no
-//! agreement. While two workers know different statuses, both may run a partition; the chain of decisions ensures that
+//! Each worker publishes its status, which expires unless it is published again. All workers with a status, except
+//! those that are shutting down, share the partitions by a function of their names (`owners`). The workers need no
+//! agreement. If two workers read different statuses, both may run a partition; the chain of decisions ensures that
 //! only one of them decides an event. A worker also publishes metrics, and gives its partitions back when it is shut
 //! down.
 

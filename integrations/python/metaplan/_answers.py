@@ -276,7 +276,7 @@ class Front(Answer):
 
 
 class Comparison(Answer):
-    """The plan beside the policies of probabilistic model checking, all evaluated in the same Markov decision process."""
+    """The plan and the policies of probabilistic model checking, all evaluated in the same Markov decision process."""
 
     @property
     def candidates(self) -> list[dict[str, Any]]:

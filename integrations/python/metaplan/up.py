@@ -246,7 +246,7 @@ _STATUSES = {
 }
 
 _MAX_SHARE = 1e6
-"""Maximum time limit of a search, in seconds, if there is no other limit: more cannot be represented at some point."""
+"""Maximum time limit of a search without a timeout, in seconds. Without it, the doubled limits could not be represented at some time."""
 
 
 class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):

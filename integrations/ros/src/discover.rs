@@ -72,7 +72,7 @@ struct Names {
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Diagnostic {
     hardware_id: String,
-    /// Most severe level so far, to which `message` belongs.
+    /// Most severe level of all received statuses. `message` belongs to it.
     level: u8,
     message: String,
     /// Last value that begins with a number, by key.

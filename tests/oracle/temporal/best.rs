@@ -9,8 +9,8 @@ use super::model::{Q, big, q};
 use super::sequence::{Edge, Search};
 use crate::judge::{Step, Truth};
 
-/// Computes the best metric of sequential plans. The answer is open if the search would exceed `cap`
-/// nodes.
+/// Computes the best metric of sequential plans. If the search would exceed `cap` nodes, the answer is open,
+/// or that there is no best value.
 pub fn best(world: &World, cap: usize) -> Truth {
     let search = Search::new(world, cap);
     let ends: Vec<usize> = search.goals.iter().map(|(edge, _)| *edge).collect();

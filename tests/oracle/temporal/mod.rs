@@ -95,8 +95,8 @@ pub fn with_derived(seed: u64) -> Option<Case> {
     (!task.axioms.is_empty()).then(|| case_of(format!("derived-{seed}"), task, None))
 }
 
-/// Creates the case of a task, with the answer of the oracle. The answer is open if the oracle would exceed
-/// `cap` nodes.
+/// Creates the case of a task, with the answer of the oracle. If the oracle would exceed `cap` nodes, the answer is
+/// open, or that there is no best value.
 fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
     let world = World::new(task);
     let truth = match unit {

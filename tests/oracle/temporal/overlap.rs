@@ -126,7 +126,7 @@ struct Search<'w> {
 }
 
 /// Returns the correct answer for a task whose times are multiples of `unit`, which is also the separation.
-/// The answer is open if the search would exceed `cap` nodes.
+/// If the search would exceed `cap` nodes, the answer is open, or that there is no best value.
 pub fn best(world: &World, unit: Q, cap: usize) -> Truth {
     let reduction = Reduction::new(world);
     let late = world.events.last().map_or(0, |(time, _)| (time / unit).to_integer() + 1);

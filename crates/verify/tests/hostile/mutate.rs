@@ -109,7 +109,6 @@ fn mend(files: &mut Files) {
     }
 }
 
-/// Deletes, repeats or replaces a range of bytes.
 fn bytes(old: &[u8], draw: &mut Draw<'_>) -> Vec<u8> {
     let start = draw.below(old.len() + 1);
     let end = (start + draw.below(40)).min(old.len());
@@ -138,7 +137,6 @@ fn tokens(text: &str, draw: &mut Draw<'_>) -> String {
     format!("{}{replacement}{}", &text[..at], &text[at + word.len()..])
 }
 
-/// Deletes, repeats, replaces or nests a parenthesised list.
 fn lists(text: &str, draw: &mut Draw<'_>) -> String {
     let mut open = Vec::new();
     let mut spans: Vec<(usize, usize)> = Vec::new();
@@ -178,7 +176,6 @@ fn lists(text: &str, draw: &mut Draw<'_>) -> String {
     format!("{}{new}{}", &text[..start], &text[end..])
 }
 
-/// Deletes, repeats, swaps, nests or replaces parts of a JSON document.
 fn structure(document: &mut Value, draw: &mut Draw<'_>) {
     let mut paths = Vec::new();
     collect(document, String::new(), &mut paths);

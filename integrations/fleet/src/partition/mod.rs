@@ -136,7 +136,6 @@ impl<S: Store> Shared<S> {
         self.counts.robots.load(Ordering::Relaxed) > self.settings.warm as u64
     }
 
-    /// Runs work of a loop, and adds its duration to the working time.
     fn timed<T>(&self, work: impl FnOnce() -> T) -> T {
         let begun = Instant::now();
         let result = work();
@@ -156,7 +155,6 @@ pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, drain: watc
     }
 }
 
-/// Repeats an operation with pauses until it succeeds.
 pub(crate) async fn persist<T, F: Future<Output = Result<T, Fault>>>(operation: impl Fn() -> F) -> T {
     let mut attempt = 1;
     loop {

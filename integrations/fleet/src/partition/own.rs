@@ -14,7 +14,8 @@ use crate::robot::Refused;
 use crate::store::{Fault, Store, Stored, Stream, Subscription};
 use crate::wire::{Address, partition_of};
 
-/// Maximum number of undecided events that each robot has in memory. Only the sequence numbers of further ones are.
+/// Maximum number of queued events of each robot whose contents are in memory. Further events are queued with their
+/// sequence numbers only.
 const MAX_QUEUE: usize = 16;
 
 pub(super) struct Partition<S> {
@@ -33,7 +34,6 @@ pub(super) struct Partition<S> {
     clock: u64,
 }
 
-/// A robot in memory, with its queue.
 struct Slot<S> {
     queue: mpsc::UnboundedSender<Queued>,
     /// One permit for each further event that can be in memory.
@@ -57,7 +57,7 @@ impl<S: Store> Partition<S> {
         look.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let mut drain = self.drain.clone();
         while !*drain.borrow_and_update() {
-            // A robot works until its events are handled and its plans found.
+            // Without running robots, all events that were read are handled.
             if self.running.is_empty() && reached != self.seen {
                 reached = self.seen;
                 let mut positions = self.shared.counts.reached.lock().unwrap_or_else(PoisonError::into_inner);
@@ -94,7 +94,7 @@ impl<S: Store> Partition<S> {
         }
         self.discard(true);
         let end = async { while self.running.join_next().await.is_some() {} };
-        // Loops that run longer are aborted.
+        // Tasks that run longer are aborted.
         let _ = tokio::time::timeout(self.shared.settings.drain, end).await;
     }
 
@@ -141,7 +141,8 @@ impl<S: Store> Partition<S> {
         });
     }
 
-    /// Registers that a robot has become idle.
+    /// Starts a runner again that has events, and forgets the robot of an obsolete one. Otherwise, the robot becomes
+    /// idle.
     fn rest(&mut self, runner: Option<Box<Runner<S>>>) {
         let Some(runner) = runner else { return };
         let name = &runner.address.robot;
@@ -176,8 +177,9 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Starts to discard the handled events of all idle robots that are due: those with an event that was handled
-    /// [`Settings::discard_within`](super::Settings::discard_within) ago, or, with `all`, all others, too.
+    /// Starts to discard the handled events of idle robots whose first handled event is at least
+    /// [`Settings::discard_within`](super::Settings::discard_within) old. With `all`, of all idle robots that have
+    /// handled events.
     fn discard(&mut self, all: bool) {
         let within = self.shared.settings.discard_within;
         let is_due =

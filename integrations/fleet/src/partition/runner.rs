@@ -15,10 +15,9 @@ use crate::robot::{Begun, Refused, Robot, Undecided, is_retirement};
 use crate::store::{Fault, Message, Store, Stored, Stream};
 use crate::wire::{Address, Decided};
 
-/// Reason why a robot is suspended after a panic, and if the thread of a search cannot be started.
+/// Reason for a suspension: work on the robot has panicked, or the thread of a search could not be started.
 const PANICKED: &str = "its loop has panicked";
 
-/// Increments a counter while it exists.
 pub(super) struct Count(Arc<AtomicU64>);
 
 impl Count {
@@ -34,7 +33,6 @@ impl Drop for Count {
     }
 }
 
-/// An event in the queue of a robot.
 pub(super) struct Queued {
     pub(super) sequence: u64,
     /// `None` if the queue in memory was full. The event is then read again when it is its turn.
@@ -55,7 +53,7 @@ enum Outcome {
     /// Nothing was decided: the event had been decided before, or there was no event.
     Known,
     Undecided(Undecided),
-    /// Another decision is the last one, or the planning problem has changed.
+    /// Another decision is the last one, or the plans of a search cannot be used.
     Outdated,
 }
 
@@ -82,7 +80,6 @@ struct Planning {
 pub(super) struct Runner<S> {
     shared: Arc<Shared<S>>,
     pub(super) address: Address,
-    /// Subject of the robot's messages.
     subject: String,
     queue: mpsc::UnboundedReceiver<Queued>,
     loaded: Option<Loaded>,
@@ -148,8 +145,8 @@ impl<S: Store> Runner<S> {
         self.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission().is_none())
     }
 
-    /// Works until there are no events and no plan is pending, or `drain` becomes true. Then discards handled events if
-    /// they are due.
+    /// Works until the queue is empty and no plan is pending, or `drain` becomes true. Then discards handled events
+    /// if they are due, the partition is given back, or the robot is not enrolled.
     pub(super) async fn run(mut self: Box<Self>, mut drain: watch::Receiver<bool>) -> Box<Self> {
         while self.has_events() || self.is_pending || self.plans.is_some() {
             if self.is_pending && self.plans.is_none() && !self.has_events() {
@@ -182,7 +179,8 @@ impl<S: Store> Runner<S> {
         self
     }
 
-    /// Returns `true` if handled events have been in the log for [`discard_within`](super::Settings::discard_within).
+    /// Returns `true` if the first handled event that is not discarded was handled
+    /// [`discard_within`](super::Settings::discard_within) ago.
     fn is_discard_due(&self) -> bool {
         self.since.is_some_and(|since| since.elapsed() >= self.shared.settings.discard_within)
     }
@@ -206,7 +204,7 @@ impl<S: Store> Runner<S> {
 
     /// Handles an event until it is decided by this worker or another one, refused, or the robot cannot continue.
     async fn decide(&mut self, event: &Stored) -> Outcome {
-        // Also before a refusal: the robot may have a pending plan.
+        // Loaded also for an event that is refused: afterwards, `register` checks if a plan is pending.
         self.load().await;
         let id = event.id.as_ref();
         if id.is_some_and(|id| id.split_once(':').is_none_or(|(robot, _)| robot != self.address.robot)) {
@@ -298,7 +296,7 @@ impl<S: Store> Runner<S> {
         }
     }
 
-    /// Publishes the decision that completes the last ones with the plans of the search.
+    /// Publishes the plans of the search in a decision that completes the decisions without a plan.
     async fn conclude(&mut self, plans: Plans) {
         self.plans = None;
         let is_cancelled = self.search.end();
@@ -322,7 +320,8 @@ impl<S: Store> Runner<S> {
         let loaded = if let Some(loaded) = self.loaded.take() {
             loaded
         } else {
-            // Plans for the problems of the former loop cannot be distinguished from those for the problems of this one.
+            // The problems of a loaded loop are numbered from 0 again. Plans for the former loop could have the same
+            // number.
             self.search.update(None);
             let last = persist(|| self.shared.store.last(Stream::Decisions, &self.subject)).await;
             let chain = last.as_ref().map_or(0, |last| last.sequence);
@@ -447,7 +446,7 @@ impl<S: Store> Runner<S> {
     }
 }
 
-/// Waits for the plans of a search, if there is one.
+/// Waits for the plans of a search. Never completes without a search.
 async fn join(plans: &mut Option<BoxFuture<'static, Plans>>) -> Plans {
     match plans {
         Some(plans) => plans.await,
@@ -463,7 +462,6 @@ async fn until(time: Option<Instant>) {
     }
 }
 
-/// Waits until the partition is given back.
 async fn drained(drain: &mut watch::Receiver<bool>) {
     if drain.wait_for(|is_draining| *is_draining).await.is_err() {
         // The runner is dropped together with the sender.

@@ -117,7 +117,6 @@ fn thread_number() -> i32 {
     0
 }
 
-/// Sets the nice value of the thread with this number to that of a class.
 fn set_niceness(thread: &AtomicI32, class: usize) {
     // On Linux, the call applies to a thread, although POSIX defines it for a process. A refused change delays other
     // work, but makes no result wrong.

@@ -115,7 +115,6 @@ impl Local {
     }
 }
 
-/// Messages of both streams, and the indices for their access.
 #[derive(Debug, Default)]
 struct Messages {
     /// By stream, partition and sequence number. Messages without an address have the partition [`u32::MAX`].
@@ -180,7 +179,7 @@ impl Messages {
         Ok(Ok(Receipt { sequence, is_known: false }))
     }
 
-    /// Removes the messages of a subject up to a sequence number.
+    /// Removes the messages of a subject up to and including the sequence number `last`.
     fn remove(
         &mut self,
         tables: &mut Tables<'_>,

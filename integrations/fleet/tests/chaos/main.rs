@@ -63,7 +63,6 @@ fn scripts(count: usize, lines: usize) -> Vec<Script> {
     (0..count.min(24)).map(script).collect()
 }
 
-/// Starts servers and workers.
 async fn begin(seed: u64, workers: usize, lease: u64) -> (Cluster, Nats) {
     let cluster = Cluster::begin(seed);
     let access = Access { url: cluster.url(), ..Access::default() };
@@ -100,7 +99,6 @@ async fn send(store: &Nats, robots: usize, scripts: &[Script], pause: u64) -> BT
     senders.join_all().await.into_iter().collect()
 }
 
-/// Returns all decisions of a partition.
 async fn read(store: &Nats, partition: u32) -> Vec<Stored> {
     for _ in 0..60 {
         if let Ok(messages) = common::read(store, Stream::Decisions, partition).await {
@@ -111,7 +109,6 @@ async fn read(store: &Nats, partition: u32) -> Vec<Stored> {
     panic!("partition {partition} cannot be read");
 }
 
-/// Returns `true` for a decision that completes others with a plan.
 fn has_plan_only(decision: &Stored) -> bool {
     String::from_utf8_lossy(&decision.payload).contains("\"planned\":true")
 }

@@ -43,7 +43,7 @@ def free_port():
 
 
 class Cluster:
-    """Processes of containers that share 127.0.0.1."""
+    """The processes of the containers, which all use 127.0.0.1."""
 
     def __init__(self, directory):
         self.directory = directory
@@ -54,7 +54,7 @@ class Cluster:
         return self.ports.setdefault((host, int(port)), free_port())
 
     def mapped(self, container, text):
-        """Text of a container with addresses of this machine. `nats` is the service that Kubernetes has for the servers."""
+        """Replaces the addresses in a text of a container. `nats` is the service of the servers in Kubernetes."""
 
         def address(match):
             host = {"0.0.0.0": container, "127.0.0.1": container, "nats": "nats-0"}.get(match[2], match[2])
@@ -79,7 +79,7 @@ class Cluster:
         self.start(name, [NATS, *words, "--addr", "127.0.0.1", "--port", str(self.port(name, 4222))])
 
     def get(self, container, url):
-        """The body of a page of a container; nothing while there is none."""
+        """Returns the body of a page of a container, or `None` if it is not available."""
         try:
             with urllib.request.urlopen(self.mapped(container, url), timeout=5) as page:
                 return page.read().decode()
@@ -87,7 +87,7 @@ class Cluster:
             return None
 
     def wait(self, what, holds):
-        """Waits until something holds; all processes have to go on meanwhile."""
+        """Waits until `holds` returns a true value, and returns it. Fails if a process ends meanwhile."""
         end = time.monotonic() + SECONDS
         while not (value := holds()):
             for name, process in self.processes.items():
@@ -126,7 +126,7 @@ def page(cluster, name, path):
 
 
 def is_member(cluster, name):
-    """Returns whether a server has routes to all others, and its JetStream a leader among all three."""
+    """Returns `True` if a server has routes to all others, and its JetStream a leader among all three."""
     routes = {route.get("remote_name") for route in page(cluster, name, "routez").get("routes", [])}
     meta = page(cluster, name, "jsz").get("meta_cluster", {})
     return routes == SERVERS.keys() - {name} and meta.get("cluster_size") == 3 and meta.get("leader") in SERVERS
@@ -143,7 +143,7 @@ def test_servers_of_compose_form_a_cluster_with_jetstream(cluster):
 
 
 def image(directory):
-    """The files that the image has besides the program."""
+    """Copies the files of the image, without the program, to a folder `image`."""
     for line in (EXAMPLES / "Containerfile").read_text().splitlines():
         if line.startswith("COPY") and "/usr/share/metaplan" in line:
             source, target = line.split()[1:]
@@ -158,7 +158,7 @@ def test_workers_of_both_files_work_on_them(cluster):
     for name in ("compose-1", "compose-2"):
         words = [cluster.mapped(name, word) for word in shlex.split(WORKER["command"])]
         cluster.start(name, [PROGRAM, *words], **environment)
-    # Servers without TLS and credentials are what there is here.
+    # The servers of this test have neither TLS nor credentials.
     words = [cluster.mapped("pod", word.replace("$(POD)", "pod")) for word in POD["args"] if not word.startswith("--creds")]
     cluster.start("pod", [PROGRAM, *words])
     ports = {port["name"]: port["containerPort"] for port in POD["ports"]}

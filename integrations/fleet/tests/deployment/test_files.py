@@ -1,4 +1,4 @@
-"""The deployment files are valid by their schemas, and ask for no more rights than they need."""
+"""The deployment files are valid according to their schemas, and request no more rights than needed."""
 
 import configparser
 import json
@@ -98,7 +98,7 @@ def test_the_user_of_an_image_is_a_number_that_orchestrators_can_check(path):
 
 
 def test_the_context_of_a_build_is_what_git_has():
-    """A context without `target` and `.git` starts in a second; a context that lacks a file does not build."""
+    """A context without `target` and `.git` is sent in a second. An image cannot be built from a context that lacks a file."""
     patterns = (ROOT / ".dockerignore").read_text().splitlines()
     context = {str(path) for path in exclude_paths(str(ROOT), patterns) if (ROOT / path).is_file()}
     tracked = {path for path in of_git("ls-files") if (ROOT / path).is_file()} - {".dockerignore"}
@@ -115,7 +115,7 @@ def test_what_an_image_copies_is_there():
 
 
 class Unit(configparser.ConfigParser):
-    """A unit of systemd; of a key that is there several times, the last one counts."""
+    """A unit of systemd. If a key occurs several times, the last value is used."""
 
     def __init__(self, path):
         super().__init__(interpolation=None, strict=False)
@@ -132,14 +132,14 @@ def test_systemd_has_no_complaint_of_the_unit(tmp_path):
     if not shutil.which("systemd-analyze"):
         pytest.skip("systemd-analyze is not there")
     copy = tmp_path / UNIT.name
-    # Its program need not be installed here.
+    # The program of the unit need not be installed here.
     copy.write_text(UNIT.read_text().replace("/usr/local/bin/metaplan-ros", sys.executable))
     out = subprocess.run(["systemd-analyze", "verify", "--man=no", copy], capture_output=True, text=True, check=False)
     assert out.returncode == 0 and not out.stderr.strip(), out.stderr
 
 
 def metrics_in(text):
-    """The metrics that a text names. The exporter adds `_sum` and `_count` to the name of a histogram, which it renders as a summary."""
+    """Returns the metrics in a text, without the suffixes `_sum` and `_count` that the exporter adds to histograms."""
     names = set()
     for name in re.findall(r"\bmetaplan_fleet_\w+", text):
         base = re.sub(r"_(sum|count)$", "", name)
@@ -149,7 +149,7 @@ def metrics_in(text):
 
 def test_the_sources_have_metrics():
     assert set(METRICS.values()) == {"counter", "gauge", "histogram"} and len(METRICS) >= 11
-    # Each macro of the sources has its name as a literal, so that the pattern finds it.
+    # Each macro in the sources has its name as a literal, so that the pattern matches it.
     assert len(re.findall(r"metrics::(?:counter|gauge|histogram)!", SOURCES)) == len(METRICS)
 
 

@@ -7,7 +7,6 @@ use std::time::Duration;
 use futures::StreamExt as _;
 use metaplan_fleet::store::{Fault, Store, Stored, Stream};
 
-/// Returns all messages of a partition.
 pub(super) async fn read<S: Store>(store: &S, stream: Stream, partition: u32) -> Result<Vec<Stored>, Fault> {
     let end = store.end(stream, partition).await?;
     let mut messages: Vec<Stored> = Vec::new();

@@ -48,7 +48,6 @@ impl Crashing {
     }
 }
 
-/// Decrements a counter and returns its former value. Fails if it is 0.
 fn decrement(counter: &AtomicU64) -> Result<u64, u64> {
     counter.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |count| count.checked_sub(1))
 }

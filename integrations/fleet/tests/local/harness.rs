@@ -40,7 +40,6 @@ pub(super) fn shared<S: Store>(store: S, name: &str, settings: Settings) -> Arc<
     Arc::new(Shared::new(store, MISSIONS.clone(), name.to_owned(), settings))
 }
 
-/// Waits until a condition holds.
 pub(super) async fn until(what: &str, mut holds: impl AsyncFnMut() -> bool) {
     let begun = Instant::now();
     while !holds().await {
@@ -107,7 +106,6 @@ impl Fleet {
         sequences
     }
 
-    /// Returns the messages of a stream, one partition after another.
     pub(super) async fn all(&self, stream: Stream) -> Vec<Stored> {
         let mut messages = Vec::new();
         for partition in 0..self.store.partitions() {
@@ -149,7 +147,6 @@ impl Fleet {
         Owner::start(shared(self.store.clone(), name, settings))
     }
 
-    /// Runs a worker until there are `count` decisions.
     pub(super) async fn work(&self, name: &str, settings: Settings, count: usize) {
         let worker = Worker::start(shared(self.store.clone(), name, settings));
         self.decided(count).await;
@@ -172,7 +169,6 @@ impl Client {
         Self { name: name.to_owned(), mission, events, sequences: Vec::new() }
     }
 
-    /// Returns a robot with at most `most` events of a scenario.
     pub(super) fn play(name: &str, scenario: (&'static str, &str), seed: u64, most: usize) -> Self {
         Self::new(name, scenario.0, scripts::play(scenario, seed, most))
     }

@@ -43,7 +43,6 @@ impl Program {
         fs::read_to_string(self.folder.path().join("log")).expect("it can be read")
     }
 
-    /// Calls `look` until it returns a value, at most for ten minutes.
     fn poll<T>(&mut self, look: impl Fn(&Self) -> Option<T>) -> T {
         for _ in 0..6000 {
             if let Some(value) = look(self) {

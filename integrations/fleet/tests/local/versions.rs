@@ -54,14 +54,12 @@ impl Versions {
         Arc::new(Shared::new(self.fleet.store.clone(), self.missions(names), names.join("+"), settings))
     }
 
-    /// Runs a worker with these versions until there are `count` decisions.
     async fn work(&self, names: &[&str], count: usize) {
         let worker = Worker::start(self.shared(names));
         self.fleet.decided(count).await;
         worker.stop().await;
     }
 
-    /// Runs a worker with these versions until it has refused `count` events or suspended robots.
     async fn refuse(&self, names: &[&str], count: u64) {
         let shared = self.shared(names);
         let worker = Worker::start(Arc::clone(&shared));
@@ -69,7 +67,6 @@ impl Versions {
         worker.stop().await;
     }
 
-    /// Returns the sequence numbers of the stored events.
     async fn kept(&self) -> Vec<u64> {
         self.fleet.all(Stream::Events).await.iter().map(|event| event.sequence).collect()
     }

@@ -29,7 +29,7 @@ ARGUMENTS = (
 
 
 def start(context):
-    """The node, once the arguments are known. It keeps its own name: PlanSys2 looks for `planner`."""
+    """Returns the node, after the arguments are known. It keeps its own name, because PlanSys2 looks for `planner`."""
     value = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
     words = ["--as", value["role"], "--rmw", value["rmw"]]
     for name in ("mission", "settings", "journal"):
@@ -52,6 +52,6 @@ def start(context):
 
 
 def generate_launch_description():
-    """What `ros2 launch` starts."""
+    """Returns the launch description for `ros2 launch`."""
     declared = [DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS]
     return LaunchDescription([*declared, OpaqueFunction(function=start)])

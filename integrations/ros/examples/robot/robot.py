@@ -23,13 +23,13 @@ DISTANCES = {("dock", "gate"): 4, ("gate", "shelf_1"): 3, ("shelf_1", "shelf_2")
 
 
 def say(text: str) -> None:
-    """Prints a line at once."""
+    """Prints a line and flushes it."""
     # In one piece: nodes print from several threads.
     print(f"{text}\n", end="", flush=True)
 
 
 class Localization(LifecycleNode):
-    """A way to localize. The robot knows where it is while the node is active."""
+    """A method of localization. The robot knows its position while the node is active."""
 
     def on_activate(self, state):
         """Activates."""
@@ -54,7 +54,7 @@ class Controller(Node):
 
 
 class Camera(Node):
-    """Takes pictures by light or by warmth."""
+    """Takes pictures with a normal or a thermal camera."""
 
     def __init__(self) -> None:
         super().__init__("camera")
@@ -65,7 +65,7 @@ class Camera(Node):
 
 
 class Lidar(Node):
-    """Driver of the lidar, with scans and a diagnostic of its own."""
+    """The driver of the lidar, with scans and its own diagnostics."""
 
     def __init__(self) -> None:
         super().__init__("lidar")
@@ -81,7 +81,7 @@ class Lidar(Node):
             self.scans.publish(LaserScan(ranges=[1.0] * 90))
 
     def diagnose(self) -> None:
-        """Publishes the state of the driver in its own words."""
+        """Publishes the state of the driver."""
         level, message = (DiagnosticStatus.ERROR, "no echo") if self.is_broken else (DiagnosticStatus.OK, "scanning")
         self.diagnostics.publish(DiagnosticArray(status=[DiagnosticStatus(level=level, name="lidar: driver", message=message)]))
 

@@ -18,7 +18,7 @@ SEARCH = "search_pipeline"
 
 
 def tell(robot: Robot, what: str) -> None:
-    """Listens for a second, and prints what came of something."""
+    """Spins for a second, and prints the mode requests of this time."""
     robot.node.spin(1.0)
     print(what)
     for event in map(json.loads, robot.events):

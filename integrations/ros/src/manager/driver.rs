@@ -204,7 +204,7 @@ impl Driver {
         self.node.log(Severity::Info, &text);
         self.handle(Input::Ready(modes))?;
         for input in delayed {
-            // Inputs that arrived in the meantime are handled afterwards.
+            // The inputs that arrived during the wait are handled later, by `drive`.
             let _ = sender.send(input);
         }
         Ok(())

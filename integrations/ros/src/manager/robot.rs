@@ -35,8 +35,8 @@ const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 /// Time after which an observation is repeated if a node was silent or in a transition, or steps were being executed.
 const OBSERVATION_DELAY: Duration = Duration::from_millis(500);
 
-/// Number of mode requests to a new server, one per period: the first ones may be lost before it
-/// has discovered this node.
+/// Number of mode requests to a new server, one per call of [`Robot::request_new_modes`]. The first ones may be lost
+/// before the server has discovered this node.
 const MAX_MODE_REQUESTS: u32 = 3;
 
 /// Minimum time between two reports of the same progress.
@@ -154,7 +154,6 @@ impl Robot {
         futures::future::join_all(missing).await.into_iter().flatten().collect()
     }
 
-    /// Returns a description if diagnostics have no writer.
     pub(super) fn missing_writer(&self) -> Option<String> {
         (!self.node.is_written("/diagnostics")).then(|| "/diagnostics has no publisher".to_owned())
     }
@@ -421,7 +420,6 @@ impl Robot {
     }
 }
 
-/// Reports of an action's progress.
 #[derive(Debug, Default)]
 struct Reports {
     /// The last known share, with the time of its last report.

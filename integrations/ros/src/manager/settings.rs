@@ -97,7 +97,6 @@ pub struct TaskSettings {
     pub facts: BTreeMap<String, toml::Value>,
 }
 
-/// Returns the value of a fact as the text of an event.
 pub(super) fn fact_value(value: &toml::Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
@@ -218,7 +217,7 @@ impl Settings {
     /// # Errors
     /// Reports all tasks and actions that do not fit the mission.
     pub(crate) fn check_mission(&self, mission: &Mission) -> Result<(), Errors> {
-        // The same text was parsed before.
+        // This cannot fail, because `read` has parsed the text.
         let Located { tasks, actions } = toml::from_str(&self.source.text).unwrap_or_default();
         let mut errors = Vec::new();
         for (task, LocatedTask { goal, facts }) in &tasks {
@@ -255,11 +254,12 @@ impl Settings {
         if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
     }
 
-    /// Checks the functions in the settings and their steps against the mission. `designs` are the mission's designs, by function.
+    /// Checks the functions in the settings and their steps against the mission. `designs` are the mission's designs,
+    /// by function.
     ///
     /// # Errors
-    /// A function or a design does not exist, a design of a function with steps has none, a function has both steps and
-    /// names for `system_modes`, or a command is not allowed.
+    /// A function or a design does not exist, a design has no steps although other designs of its function have, a
+    /// function has both steps and names for `system_modes`, or a command is not allowed.
     pub(crate) fn check_steps(
         &self,
         designs: &BTreeMap<String, Vec<String>>,

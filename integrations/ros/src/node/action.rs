@@ -308,9 +308,9 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Passes on each running goal that a cancel request selects: all goals, the goal with an id, the goals accepted
-    /// up to a time, or the goal with an id and those accepted up to a time (`action_msgs/srv/CancelGoal`). Answers
-    /// with an error code if the request selects no running goal.
+    /// Passes each running goal that a cancel request selects to `take`: all goals, the goal with an id, the goals
+    /// accepted up to a time, or the goal with an id and the goals accepted up to a time
+    /// (`action_msgs/srv/CancelGoal`). Answers with an error code if the request selects no running goal.
     fn cancel(
         &self,
         request: RmwRequestId,

@@ -23,7 +23,6 @@ pub(crate) struct Arrivals {
 }
 
 impl Arrivals {
-    /// Returns `true` if the last message arrived at the time `since` or later.
     pub(crate) fn is_after(&self, since: Instant) -> bool {
         self.last.lock().unwrap_or_else(PoisonError::into_inner).is_some_and(|last| last >= since)
     }

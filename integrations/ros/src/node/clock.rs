@@ -78,7 +78,6 @@ impl Clock {
         state.simulated = Some(time);
     }
 
-    /// Marks `/clock` as subscribed. Returns the previous mark.
     fn mark_subscribed(&self) -> bool {
         std::mem::replace(&mut self.state().is_subscribed, true)
     }

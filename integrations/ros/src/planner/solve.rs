@@ -134,7 +134,6 @@ impl NoPlan {
 pub(crate) const DOMAIN: &str = "domain";
 pub(crate) const PROBLEM: &str = "problem";
 
-/// Formats the errors among the messages, with their locations, on a single line.
 fn one_line(messages: &[Message]) -> String {
     let texts = messages.iter().filter(|message| message.is_error()).map(|message| {
         let place = match (&message.file, message.line, message.column) {
@@ -196,7 +195,6 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
     })
 }
 
-/// A mission, its problem completed with the knowledge base, and the planning parameters.
 struct FilledMission<'a> {
     mission: &'a Mission,
     problem: &'a Problem,
@@ -205,7 +203,6 @@ struct FilledMission<'a> {
 }
 
 impl FilledMission<'_> {
-    /// Returns the remaining time as a limit.
     fn remaining(&self) -> Limits {
         Limits::none().with_time(self.manner.time_limit.saturating_sub(self.start.elapsed()))
     }

@@ -57,7 +57,8 @@ struct NodeClient {
     get_parameters: Caller<GetParameters>,
 }
 
-/// Message on a topic that was published last, with the time of its publication (if unknown, of its arrival).
+/// Last published message on a topic, with the time of its publication. If that is unknown, with the time of its
+/// arrival.
 type LastMessage = Arc<Mutex<Option<(SystemTime, Vec<u8>)>>>;
 
 struct Observed {
@@ -208,9 +209,9 @@ impl Clients {
         }
     }
 
-    /// Returns the GUIDs of the servers that report the state or the parameters of a node. A
-    /// condition about the last message on a topic has no server. Its result is an id made from the
-    /// condition while it holds, so that the result changes when the mode changes.
+    /// Returns the GUIDs of the servers that report the state or the parameters of a node. For a condition about the
+    /// last message on a topic, which has no server, returns an id of the condition while it holds: a change of the
+    /// mode then changes the result.
     pub(super) fn servers(&self, condition: &Condition) -> BTreeSet<[u8; 16]> {
         let (Condition::State { node, .. } | Condition::Parameters { node, .. }) = condition else {
             let is_met = !matches!(condition, Condition::Topic(_)) && self.is_met(condition);
@@ -468,7 +469,7 @@ fn last_message(last: &LastMessage) -> Option<Vec<u8>> {
     last.as_ref().map(|(_, message)| message.clone())
 }
 
-/// Executes a program. Its output goes to standard error. It is killed at the deadline.
+/// Executes a program, and kills it at the deadline. Its output goes to standard error.
 pub(super) async fn execute(words: &[String], deadline: Instant) -> Result<(), Failure> {
     let [program, arguments @ ..] = words else { return Ok(()) };
     let child = smol::process::Command::new(program)

@@ -19,13 +19,14 @@ pub(crate) enum Outcome {
     /// A step has failed, a condition does not hold although the robot answers, or a newer request replaces the
     /// procedure. Earlier steps were undone as far as possible.
     Failed(String),
-    /// A node does not answer. Earlier steps were undone as far as possible.
+    /// The robot has given no valid answer in time. Earlier steps were undone as far as possible.
     Silent(String),
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Seen {
-    /// The observable conditions of this mode hold. The last mode that was set is assumed if it has none.
+    /// The observable conditions of this mode hold. A mode without observable conditions is assumed to be unchanged
+    /// if it was the last one.
     Mode(String),
     /// The conditions of no mode hold.
     Nothing,
@@ -92,7 +93,6 @@ impl Procedures {
         self.functions.get(function).is_some_and(|procedures| procedures.conditions().next().is_none())
     }
 
-    /// Returns the nodes whose state or parameters show the mode of a function.
     pub(crate) fn nodes(&self, function: &str) -> BTreeSet<String> {
         let conditions = self.functions.get(function).into_iter().flat_map(FunctionProcedures::conditions);
         let node = |condition| match condition {

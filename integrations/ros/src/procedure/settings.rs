@@ -358,7 +358,7 @@ impl OperationEntry {
 }
 
 impl Operation {
-    /// Returns the condition that an operation must have established, if one can be observed later.
+    /// Returns the condition that the operation establishes. Returns `None` if its effect cannot be observed later.
     pub(crate) fn condition(&self) -> Option<Condition> {
         match self {
             Self::State { node, state } => Some(Condition::State { node: node.clone(), state: *state }),
@@ -407,7 +407,6 @@ impl Procedure {
         lasting
     }
 
-    /// Returns all operations, including those that undo steps.
     pub(crate) fn operations(&self) -> impl Iterator<Item = &Operation> {
         self.steps.iter().flat_map(|step| std::iter::once(&step.operation).chain(&step.undo))
     }

@@ -136,8 +136,7 @@ impl Network {
             match self.inputs.recv_timeout(wait) {
                 Ok(input) => {
                     self.handle(input, clock.elapsed());
-                    // The state is written before the requests are sent, so that a crash in between
-                    // loses none of them.
+                    // The state is written before the requests are sent, so that a crash in between loses no goal.
                     if let Some(memory) = &mut self.memory {
                         memory.write(self.keeping.memory())?;
                     }

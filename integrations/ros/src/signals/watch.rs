@@ -103,7 +103,8 @@ impl Samples {
     }
 }
 
-/// Reads the last message of a topic if it was skipped. Does nothing if no message is skipped.
+/// Periodically reads the last message of a topic if it was skipped. Returns `None` if `every` is zero: then no
+/// message is skipped.
 fn watch_skipped(
     clock: Arc<Clock>,
     samples: &Arc<Mutex<Samples>>,
@@ -139,7 +140,6 @@ struct Reporter {
 }
 
 impl Reporter {
-    /// Reports whether the component works. Does nothing if the signal measures an attribute.
     fn works(&self, works: bool) {
         if let Target::Component { component, .. } = &self.target {
             self.send(COMPONENT, component, if works { "TRUE" } else { "FALSE" }.to_owned());

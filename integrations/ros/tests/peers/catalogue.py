@@ -1,4 +1,4 @@
-"""All scenarios: importing a module registers those that are in it."""
+"""The list of all scenarios. Importing a scenario module registers its scenarios."""
 
 import citizen
 import controlling

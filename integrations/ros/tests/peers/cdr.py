@@ -40,7 +40,7 @@ class Rust:
         self._process = subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
     def ask(self, **question: Any) -> dict[str, Any]:
-        """One question, one answer."""
+        """Sends a question and returns the answer."""
         self._process.stdin.write(json.dumps(question) + "\n")
         self._process.stdin.flush()
         line = self._process.stdout.readline()
@@ -49,13 +49,13 @@ class Rust:
         return json.loads(line)
 
     def close(self) -> int:
-        """Its exit status."""
+        """Ends the program and returns its exit status."""
         self._process.stdin.close()
         return self._process.wait()
 
 
 def value_of(description: Any, types: Any, draw: random.Random, plain: bool) -> Any:
-    """A random value; a plain one has long strings and long sequences nowhere."""
+    """Returns a random value. With `plain`, its strings are short."""
     kind, detail = int(description[0]), description[1]
     if kind == codec.NAME:
         return {name: value_of(field, types, draw, plain) for name, field in codec.fields(detail, types)}
@@ -75,7 +75,7 @@ def value_of(description: Any, types: Any, draw: random.Random, plain: bool) -> 
 
 
 def compare(rust: Rust, name: str, variant: str | None, types: Any) -> list[str]:
-    """What differs, for all random values of a type."""
+    """Returns the differences for all random values of a type."""
     draw, found = random.Random(f"{variant} {name}"), []
     for count in range(VALUES):
         value = value_of((codec.NAME, name), types, draw, False)
@@ -92,7 +92,7 @@ def compare(rust: Rust, name: str, variant: str | None, types: Any) -> list[str]
 
 
 def rubbish(rust: Rust, name: str, variant: str | None, types: Any) -> list[str]:
-    """Shortened octets of a value, and huge lengths, have to be refused or read, never to end the program."""
+    """Checks that shortened octets and very large lengths are refused or read, and never end the program."""
     octets = codec.encode(name, value_of((codec.NAME, name), types, random.Random(name), True), types)
     for length in sorted({4, 5, len(octets) // 2, max(len(octets) - 1, 4)}):
         rust.ask(type=name, cdr=octets[:length].hex(), **({"variant": variant} if variant else {}))
@@ -101,12 +101,12 @@ def rubbish(rust: Rust, name: str, variant: str | None, types: Any) -> list[str]
     return []
 
 
-# `ros2-pyterfaces` has the definitions of Humble for these types. Jazzy added `variance` to `Range`.
+# `ros2-pyterfaces` has the Humble definitions of these types. Jazzy added `variance` to `Range`.
 OUTDATED_IN_PYTERFACES = {"sensor_msgs/msg/Range"}
 
 
 def of_pyterfaces(name: str) -> str | None:
-    """The hash by `ros2-pyterfaces`, if it knows the current definition of the type."""
+    """Returns the hash of `ros2-pyterfaces`, or `None` if it does not have the current definition of the type."""
     if name in OUTDATED_IN_PYTERFACES:
         return None
     _, kind, short = name.split("/")
@@ -118,7 +118,7 @@ def of_pyterfaces(name: str) -> str | None:
 
 
 def main() -> int:
-    """Compares everything; the exit status is 1 if anything differs."""
+    """Compares everything. The exit status is 1 if anything differs."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("program", help="the built example `cdr` of metaplan-ros")
     rust = Rust(parser.parse_args().program)

@@ -1,4 +1,4 @@
-"""Scenarios about the graph of nodes: names, states, parameters, logs, and what a user hears of the program."""
+"""Scenarios about the ROS graph: names, states, parameters, logs, and the messages of the program for its user."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = 1, 2, 3, 4
 
 
 def answer(node: Node, client: Client, value: dict[str, Any] | None = None, timeout: float = 3.0) -> Any:
-    """The answer of a service that is there, or an assertion."""
+    """Returns the answer of a service that has to be available; otherwise an assertion fails."""
     check(node.spin_until(client.ready, 5.0), "a service was not discovered within 5 s")
     node.spin(0.2)  # its writer may discover our reader a little later
     call: Call = client.call(value)
@@ -26,14 +26,14 @@ def answer(node: Node, client: Client, value: dict[str, Any] | None = None, time
 
 
 def timeout_of(node: Node, name: str) -> float:
-    """The parameter `call_timeout` of a node."""
+    """Returns the parameter `call_timeout` of a node."""
     getter = node.client(f"{name}/get_parameters", "rcl_interfaces/srv/GetParameters")
     return answer(node, getter, {"names": ["call_timeout"]}).values[0].double_value
 
 
 @scenario()
 def graph(setting: Setting) -> str:
-    """`ros2 node list`, `ros2 lifecycle get` and `ros2 param list` show the program; it reports plans and events."""
+    """`ros2 node list`, `ros2 lifecycle get` and `ros2 param list` show the program. It publishes plans and events."""
     with play(setting) as (robot, _):
         node, plans, logs, about = robot.node, [], [], []
         node.subscribe("/metaplan/plan", STRING, lambda message: plans.append(message.data))
@@ -89,7 +89,7 @@ def graph(setting: Setting) -> str:
 
 @scenario()
 def remapped(setting: Setting) -> str:
-    """Node name, namespace, the name of a service and parameters are given by `--ros-args`."""
+    """`--ros-args` set the node name, the namespace, the name of a service and parameters."""
 
     def words(program: Program) -> list[str]:
         file = program.directory / "parameters.yaml"
@@ -111,7 +111,7 @@ def remapped(setting: Setting) -> str:
 
 @scenario()
 def states(setting: Setting) -> str:
-    """`ros2 lifecycle set` deactivates the program and activates it again: inactive, it grants nothing."""
+    """`ros2 lifecycle set` deactivates and activates the program. While it is inactive, it grants no task."""
     with play(setting) as (robot, _):
         node = robot.node
         change = node.client("/metaplan/change_state", "lifecycle_msgs/srv/ChangeState")

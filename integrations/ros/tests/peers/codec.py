@@ -39,7 +39,7 @@ def _parts(text: str, count: int) -> list[str]:
 
 
 def _texts(variant: str | None) -> dict[str, str]:
-    """All types as messages: what the middleware generates for services and actions is written out."""
+    """Returns the texts of all types as messages, including those that ROS generates for services and actions."""
     changed = CORRECTED | VARIANTS.get(variant or "", {})
     texts = {name: changed.get(name, text) for name, text in MESSAGES.items()}
     texts |= {name: text for name, text in changed.items() if "/msg/" in name}
@@ -70,7 +70,7 @@ def _at_most_one(name: str) -> Any:
 
 
 def _described(texts: dict[str, str]) -> dict[str, Any]:
-    """What only a description knows, never the wire: services, their events, and actions as structures."""
+    """Returns the types that appear in type descriptions only: services, service events and actions."""
     found: dict[str, Any] = {}
     for name in [name.removesuffix("_Request") for name in texts if name.endswith("_Request")]:
         request, response = f"{name}_Request", f"{name}_Response"
@@ -92,7 +92,7 @@ def _described(texts: dict[str, str]) -> dict[str, Any]:
 
 
 def store(variant: str | None = None) -> Any:
-    """All types, as a distribution has them; Jazzy without a name."""
+    """Returns the store of all types of a distribution, by default Jazzy."""
     types = get_typestore(Stores.ROS2_JAZZY)
     found: dict[str, Any] = {}
     texts = _texts(variant)
@@ -100,7 +100,7 @@ def store(variant: str | None = None) -> Any:
     for name, text in texts.items():
         if name in types.types and name not in replaced:
             continue
-        # The parser knows no services: it is told that this is a message of the same package.
+        # The parser does not support services, so this is declared as a message of the same package.
         package = name.split("/")[0]
         ((constants, fields),) = get_types_from_msg(text, f"{package}/msg/Any").values()
         if not fields:  # ROS puts a byte into structures without members
@@ -116,7 +116,7 @@ STORE = store()
 
 
 def fields(name: str, types: Any = STORE) -> list[tuple[str, Any]]:
-    """The fields of a type in the order of CDR."""
+    """Returns the fields of a type in the order of CDR."""
     return types.fielddefs[name][1]
 
 
@@ -144,7 +144,7 @@ def _build(description: Any, value: Any, types: Any) -> Any:
 
 
 def build(name: str, value: dict[str, Any], types: Any = STORE) -> Any:
-    """The object of `rosbags` for a dictionary; an unknown key is a mistake of the test."""
+    """Returns the `rosbags` object for a dictionary. An unknown key is a mistake in the test."""
     known = fields(name, types)
     unknown = set(value) - {field for field, _ in known}
     if unknown:
@@ -153,21 +153,21 @@ def build(name: str, value: dict[str, Any], types: Any = STORE) -> Any:
 
 
 def encode(name: str, value: dict[str, Any], types: Any = STORE) -> bytes:
-    """Little-endian CDR with the encapsulation header of four octets."""
+    """Returns little-endian CDR with the encapsulation header of four octets."""
     return bytes(types.serialize_cdr(build(name, value, types), name))
 
 
 def decode(name: str, octets: bytes) -> Any:
-    """The value of a CDR text with its encapsulation header; raises where the text does not fit the type."""
+    """Decodes CDR with its encapsulation header. Raises an exception if the octets do not fit the type."""
     return STORE.deserialize_cdr(octets, name)
 
 
 def type_hash(name: str, types: Any = STORE) -> str:
-    """RIHS01 of a type."""
+    """Returns the RIHS01 hash of a type."""
     return types.hash_rihs01(name)
 
 
 def dds_name(name: str) -> str:
-    """`pkg/msg/X` as DDS knows it: `pkg::msg::dds_::X_`."""
+    """Returns the DDS name of a type: `pkg::msg::dds_::X_` for `pkg/msg/X`."""
     package, kind, short = name.split("/")
     return f"{package}::{kind}::dds_::{short}_"

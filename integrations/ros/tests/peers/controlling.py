@@ -9,7 +9,7 @@ from scenarios import Setting, check, scenario
 from transport import connect
 
 EXAMPLE = ROOT / "integrations" / "ros" / "examples" / "nav2"
-# The way of the example's round, and what the designs make of it: 18 m and two pictures of 2 s; 1 or 2 s for each metre.
+# The path of the example's round: 18 m, and two pictures of 2 s. Each metre takes 1 or 2 s, depending on the design.
 ROUND = [
     "(move dock gate)",
     "(move gate shelf_1)",
@@ -23,7 +23,7 @@ BY_LIDAR, BY_CAMERA = 22.0, 40.0
 
 
 class Patient(Executor):
-    """An executor that never ends its first plan, but cancels it when asked to."""
+    """An executor that never ends its first plan, and cancels it on request."""
 
     def _goal(self, goal: bytes, value: object) -> bool:
         if self.plans:
@@ -38,7 +38,7 @@ class Patient(Executor):
 
 
 def experts(node: Node) -> None:
-    """PlanSys2's experts, with the domain and the problem of the example."""
+    """Serves PlanSys2's expert services with the domain and the problem of the example."""
     domain, problem = ((EXAMPLE / name).read_text() for name in ("domain.pddl", "problem.pddl"))
     node.serve(
         "/domain_expert/get_domain", "plansys2_msgs/srv/GetDomain", lambda _: {"success": True, "domain": domain}
@@ -50,7 +50,7 @@ def experts(node: Node) -> None:
 
 @scenario()
 def controller(setting: Setting) -> str:
-    """The plan is handed to the executor; when a design of it is lost, it is cancelled and another one is handed over."""
+    """The executor gets the plan. When a design of the plan is lost, the plan is cancelled and another plan is sent."""
     program = Program(setting.program, "controller", setting.vendor, setting.domain, mission=EXAMPLE / "mission.toml")
     setting.programs.append(program)
     node = Node(connect(setting.vendor, setting.domain), "executor")

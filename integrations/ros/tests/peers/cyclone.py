@@ -13,7 +13,7 @@ import struct
 import time
 from typing import Any
 
-# Loopback only, whatever the machine's network looks like.
+# Loopback only, independently of the machine's network.
 os.environ.setdefault(
     "CYCLONEDDS_URI",
     '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>'
@@ -37,7 +37,7 @@ _TYPES: dict[str, Any] = {}
 
 
 def _raw_type(type_name: str) -> Any:
-    """A DDS type of this name whose samples are octets."""
+    """Returns a DDS type with this name whose samples are octets."""
     if type_name not in _TYPES:
         raw = make_idl_struct("Raw", type_name, {"first": types.uint8})
 
@@ -96,7 +96,7 @@ class _Reader:
 
 
 def _split(octets: bytes) -> tuple[tuple[int, int], bytes]:
-    """The header of a request or reply, and the body with an encapsulation header of its own."""
+    """Splits a request or reply into its header, and its body with an encapsulation header."""
     return _HEADER.unpack_from(octets, 4), octets[:4] + octets[4 + _HEADER.size :]
 
 
@@ -147,7 +147,7 @@ class _Replier:
 
 
 class Cyclone:
-    """A participant."""
+    """A participant of Cyclone DDS."""
 
     def __init__(self, domain: int) -> None:
         self._participant = DomainParticipant(domain)

@@ -130,7 +130,7 @@ mros2_msgs/QoS qos_status""",
     "nav2_msgs/action/NavigateToPose": _NAVIGATE.format(result="uint16 error_code\nstring error_msg", more=""),
 }
 
-# What `rosbags` has otherwise than Jazzy: the definition says char[16], and ROS reads char as uint8.
+# Differences of `rosbags` from Jazzy: the definition has char[16], and ROS reads char as uint8.
 CORRECTED: dict[str, str] = {
     "service_msgs/msg/ServiceEventInfo": """uint8 event_type
 builtin_interfaces/Time stamp
@@ -138,7 +138,7 @@ uint8[16] client_gid
 int64 sequence_number"""
 }
 
-# Where a distribution, or an older release, differs.
+# Differences of a distribution or an older release.
 VARIANTS: dict[str, dict[str, str]] = {
     "humble": {"nav2_msgs/action/NavigateToPose": _NAVIGATE.format(result="std_msgs/Empty result", more="")},
     "iron": {"nav2_msgs/action/NavigateToPose": _NAVIGATE.format(result="uint16 error_code", more="")},

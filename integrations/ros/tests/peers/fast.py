@@ -18,7 +18,7 @@ BRIDGE = Path(__file__).resolve().parents[4] / "target" / "ros" / "bridge"
 
 
 def bridge_program() -> Path:
-    """The built bridge; `METAPLAN_FASTDDS_BRIDGE` overrides where it lies."""
+    """Returns the path of the built bridge. `METAPLAN_FASTDDS_BRIDGE` overrides it."""
     return Path(os.environ.get("METAPLAN_FASTDDS_BRIDGE", BRIDGE))
 
 
@@ -47,7 +47,7 @@ class _Requester:
 
     def _take(self, words: list[str]) -> None:
         guid, number = words[0].split(":")
-        # rmw_fastrtps takes replies to its reader and, from older servers, to its writer.
+        # rmw_fastrtps accepts replies to its reader and, from older servers, to its writer.
         if guid in self._mine:
             self._on_reply(int(number), bytes.fromhex(words[1]))
 
@@ -78,7 +78,7 @@ class _Replier:
 
 
 class Fast:
-    """A participant in a process of its own."""
+    """A participant of Fast DDS in its own process."""
 
     def __init__(self, domain: int) -> None:
         command = [str(bridge_program()), str(domain)]
@@ -125,7 +125,7 @@ class Fast:
         self._lines.extend(line.decode() for line in lines)
 
     def _wait(self, wanted: Callable[[str], bool], timeout: float = 10.0) -> str:
-        """The first line of this kind; what else comes in waits for the next `poll`."""
+        """Returns the first line for which `wanted` is true. The other lines wait for the next `poll`."""
         end, seen = time.monotonic() + timeout, 0
         while time.monotonic() < end:
             for position in range(seen, len(self._lines)):
@@ -138,7 +138,7 @@ class Fast:
         raise TimeoutError("the Fast DDS bridge does not answer")
 
     def wait_sent(self, token: str) -> list[str]:
-        """GUIDs of the reader and the writer, and the sequence number, of a request."""
+        """Returns the GUIDs of the reader and the writer, and the sequence number, of a request."""
         return self._wait(lambda line: line.startswith(f"S {token} ")).split()[2:]
 
     def poll(self, timeout: float) -> None:
@@ -162,7 +162,7 @@ class Fast:
 
 
 def available() -> str:
-    """Why Fast DDS cannot be had here; empty if it can."""
+    """Returns the reason why Fast DDS is not available, or an empty string if it is available."""
     program = bridge_program()
     return "" if program.exists() else f"{program.name} is not built"
 

@@ -1,4 +1,4 @@
-"""Scenarios in which the robot, its mode manager or the network misbehave, and in which the program is killed."""
+"""Scenarios in which the robot, its mode manager or the network is faulty, and in which the program is killed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from transport import connect
 
 @scenario()
 def battery(setting: Setting) -> str:
-    """The battery falls below a quarter: the robot recharges, and goes on when it is told that it may."""
+    """The battery falls below a quarter: the robot recharges, and continues after the charge is reported."""
     with play(setting) as (robot, _):
         see(robot, CLEAR)
         check(robot.request(SEARCH), "the task was not granted")
@@ -26,7 +26,7 @@ def battery(setting: Setting) -> str:
         no_fault(robot)
         robot.play(Stimulus(0, "battery", 0.24))
         no_fault(robot)
-        # Whichever is heard of first, the end of the recharging or the new level, may be what it goes on with.
+        # Either the end of the recharging or the new level can arrive first and let the robot continue.
         robot.oracle.world.battery = 1.0
         robot.oracle.stimulus("end of the recharging", time.time())
         robot.recharged.send({"data": True})
@@ -37,7 +37,7 @@ def battery(setting: Setting) -> str:
 
 @scenario()
 def refuses(setting: Setting) -> str:
-    """A design is refused: it is not realisable, the next best one is taken; later it is granted again."""
+    """A design is refused: the program selects the next best one, and soon stops to request the refused one."""
     with play(setting) as (robot, _):
         robot.modes.faults.refuses = {"fd_spiral_high"}
         robot.oracle.world.refused = {"fd_spiral_high"}
@@ -55,7 +55,7 @@ def refuses(setting: Setting) -> str:
 
 
 def _unresponsive(setting: Setting, prepare: Callable[[Robot], None], limit: float) -> str:
-    """The mode manager does not answer as it should: no hang, a report; it works again when the fault is gone."""
+    """The mode manager gives no valid answer in time: the program does not hang, reports this and recovers later."""
     with play(setting) as (robot, program):
         see(robot, CLEAR)
         check(robot.request(SEARCH), "the task was not granted")
@@ -89,25 +89,25 @@ def _unresponsive(setting: Setting, prepare: Callable[[Robot], None], limit: flo
 
 @scenario()
 def silent(setting: Setting) -> str:
-    """change_mode never answers, for a while."""
+    """`change_mode` does not answer for some time."""
     return _unresponsive(setting, lambda robot: setattr(robot.modes.faults, "silent", True), 11.0)
 
 
 @scenario(quick=False)
 def late(setting: Setting) -> str:
-    """change_mode answers after more than five seconds."""
+    """`change_mode` answers after more than five seconds."""
     return _unresponsive(setting, lambda robot: setattr(robot.modes.faults, "delay", 6.0), 14.0)
 
 
 @scenario()
 def rubbish_reply(setting: Setting) -> str:
-    """change_mode answers with octets that are no answer."""
+    """`change_mode` answers with octets that are not a valid response."""
     return _unresponsive(setting, lambda robot: setattr(robot.modes.faults, "rubbish", True), 11.0)
 
 
 @scenario()
 def rubbish_diagnostics(setting: Setting) -> str:
-    """/diagnostics carries octets that are no DiagnosticArray, between samples that are."""
+    """`/diagnostics` carries octets that are not a `DiagnosticArray`, between valid samples."""
     rubbish = [
         b"\x00\x01\x00\x00",
         b"\x00\x01\x00\x00" + b"\xff" * 40,
@@ -145,7 +145,7 @@ def rubbish_diagnostics(setting: Setting) -> str:
 
 @scenario()
 def wrong_type(setting: Setting) -> str:
-    """Others use the same topic and service with another type: nothing is read as what it is not."""
+    """Other nodes use the same topic and service with another type: their data is not read as the expected type."""
     with play(setting) as (robot, _):
         see(robot, CLEAR)
         other = Node(connect(setting.vendor, setting.domain), "other")
@@ -166,7 +166,7 @@ def wrong_type(setting: Setting) -> str:
 
 @scenario()
 def someone_else(setting: Setting) -> str:
-    """Somebody else switches a function: this is seen, and what is better is asked for again."""
+    """Another node switches a function: the program detects this and requests the better mode again."""
     with play(setting) as (robot, program):
         see(robot, CLEAR)
         check(robot.request(SEARCH), "the task was not granted")
@@ -183,7 +183,7 @@ def someone_else(setting: Setting) -> str:
 
 @scenario()
 def killed(setting: Setting) -> str:
-    """kill -9 in the middle of a mission, twice; the second time somebody switches before it is back."""
+    """`kill -9` in the middle of a mission, twice; the second time, a mode changes before the program runs again."""
     with play(setting) as (robot, program):
         see(robot, CLEAR)
         check(robot.request(SEARCH), "the task was not granted")
@@ -205,7 +205,8 @@ def killed(setting: Setting) -> str:
         before = len(robot.modes.requests)
         program.kill()
         robot.node.spin(0.3)
-        # All spirals are right for the water, and the journal says that the high one runs: it has to see that it does not.
+        # All spirals are allowed in this water, and the journal has the high one as running: the program must detect
+        # the change.
         robot.modes.switch(PATH, "fd_spiral_low")
         program.start()
         check(_again(robot), "the program was not discovered again")
@@ -223,7 +224,7 @@ def killed(setting: Setting) -> str:
 
 
 def _again(robot: Robot) -> bool:
-    """Whether a program that was started again is discovered; the old one may still be in the books."""
+    """Returns `True` if a restarted program answers; the previous one may still be in the discovery data."""
     probe = robot.node.client("/task/request", "suave_msgs/srv/Task")
     end = time.monotonic() + 25
     while time.monotonic() < end:
@@ -236,7 +237,7 @@ def _again(robot: Robot) -> bool:
 
 
 def _remote(setting: Setting, part: Callable[[Remote, Robot], None], limit: float) -> str:
-    """The mode manager is a process of its own, which goes and comes back with everything ungrounded: the mission goes on."""
+    """The mode manager ends and returns as a new process, with all functions ungrounded; the mission continues."""
     program = Program(setting.program, "manager", setting.vendor, setting.domain)
     setting.programs.append(program)
     modes = Remote(setting.vendor, setting.domain)
@@ -270,7 +271,7 @@ def _remote(setting: Setting, part: Callable[[Remote, Robot], None], limit: floa
 
 @scenario()
 def vanishes(setting: Setting) -> str:
-    """The mode manager is killed; while it is away the water becomes murky."""
+    """The mode manager is killed, and the water becomes murky while it is absent."""
 
     def part(modes: Remote, robot: Robot) -> None:
         modes.kill()
@@ -294,7 +295,7 @@ def restarts(setting: Setting) -> str:
 
 @scenario()
 def wrong_mapping(setting: Setting) -> str:
-    """The other vendor's mapping of services is forced: calls time out, and it is said which mapping was used."""
+    """The service mapping of the other vendor is forced: calls time out, and the program names the right `--rmw`."""
     other = "fastrtps" if setting.vendor == "cyclonedds" else "cyclonedds"
     program = Program(setting.program, "manager", setting.vendor, setting.domain, rmw=other)
     setting.programs.append(program)
@@ -314,7 +315,7 @@ def wrong_mapping(setting: Setting) -> str:
 
 @scenario()
 def rubbish_requests(setting: Setting) -> str:
-    """Services of the program get octets that are no request, and nobody waits for the answers: others are still served."""
+    """Services get invalid requests from clients that do not wait. The other clients are still served."""
     rubbish = [
         b"\x00\x01\x00\x00" + body for body in (b"", b"\xff" * 8, b"\xff\xff\xff\x7f", bytes(range(64)), b"\x01" * 3)
     ]
@@ -343,7 +344,7 @@ def rubbish_requests(setting: Setting) -> str:
 
 @scenario()
 def flood(setting: Setting) -> str:
-    """Diagnostics come faster than anything can be switched: what was said last counts, and soon."""
+    """Diagnostics arrive faster than the program can switch: it soon uses the latest one."""
     with play(setting) as (robot, _):
         see(robot, CLEAR)
         check(robot.request(SEARCH), "the task was not granted")

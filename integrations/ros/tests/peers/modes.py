@@ -44,7 +44,7 @@ RUBBISH = b"\x00\x01\x00\x00" + bytes(range(250, 256)) * 5  # an answer of 30 oc
 
 @dataclass
 class Faults:
-    """How the mode manager misbehaves."""
+    """The faults that the mode manager simulates."""
 
     refuses: set[str] = field(default_factory=set)  # modes that are answered with false
     delay: float = 0.0  # s before an answer
@@ -54,7 +54,7 @@ class Faults:
 
 
 class System:
-    """One function with its node."""
+    """A function with its node."""
 
     def __init__(self, node: Node, name: str, manager: ModeManager) -> None:
         self.name, self._manager = name, manager
@@ -95,7 +95,7 @@ class System:
         self._transitions.send({**stamp, "start_state": before, "goal_state": self._state()})
 
     def enter(self, mode: str) -> None:
-        """Switches, and says so as system_modes and the node below do."""
+        """Enters a mode and publishes the same events as system_modes and the node below."""
         active, altitude = MODES[self.name][mode]
         event = self._event(mode)
         self._requested.send(event)
@@ -107,7 +107,7 @@ class System:
 
 
 class ModeManager:
-    """All functions; the requests go through the oracle."""
+    """The mode manager of all functions. Reports each request to the oracle."""
 
     def __init__(self, node: Node, oracle: Oracle, functions: list[str]) -> None:
         self.node, self.oracle, self.faults = node, oracle, Faults()
@@ -118,15 +118,15 @@ class ModeManager:
         self.systems = {name: System(node, name, self) for name in functions}
 
     def current(self, function: str) -> str:
-        """The mode in which a function is."""
+        """Returns the current mode of a function."""
         return self.systems[function].mode
 
     def ready(self) -> bool:
-        """Whether a client of each function was discovered."""
+        """Returns `True` if a client of each function was discovered."""
         return all(system.replier.ready() for system in self.systems.values())
 
     def serve_configuration(self) -> None:
-        """mros2_system_modes_bridge: a function and a design become a node and a mode of the same name."""
+        """Serves mros2_system_modes_bridge: a function and a design become a node and a mode of the same name."""
 
         def configure(request: Any) -> dict[str, Any] | bytes | Later | None:
             return self.asked(request.required_function_name, request.required_fd_name)
@@ -135,21 +135,21 @@ class ModeManager:
         self._configuration = self.node.serve(name, "mros2_msgs/srv/MetacontrolFD", configure)
 
     def configuration_ready(self) -> bool:
-        """Whether a client of the bridge was discovered."""
+        """Returns `True` if a client of the bridge was discovered."""
         return self._configuration is not None and self._configuration.ready()
 
     def idle(self) -> bool:
-        """Whether every request has been answered."""
+        """Returns `True` if no request is pending. Requests without a valid answer are not counted."""
         return self._under_way == 0
 
     def set_altitude(self, node: str, metres: float) -> None:
-        """What a mode sets on the node below, as /parameter_events tells it."""
+        """Publishes on `/parameter_events` the parameter that a mode sets on the node below."""
         value = {"type": DOUBLE, "double_value": metres}
         changed = [{"name": "spiral_altitude", "value": value}]
         self._parameters.send({"stamp": now(), "node": node, "changed_parameters": changed})
 
     def asked(self, function: str, mode: str) -> dict[str, Any] | bytes | Later | None:
-        """A request for a mode, by whichever way."""
+        """Handles a request for a mode from either interface, and returns the answer."""
         self.requests.append((time.time(), function, mode))
         reaction = self.oracle.request(function, mode)
         if self.faults.silent:
@@ -159,11 +159,11 @@ class ModeManager:
         known = function in MODES and mode in MODES[function]
         success = known and mode not in self.faults.refuses
         if self.faults.delay:
-            # The mode is entered late, too; the oracle hears of it then.
+            # The mode is also entered late; the oracle is notified then.
             self._under_way += 1
             self.node.after(self.faults.delay, lambda: self._done(function, mode, success, reaction))
             return Later(self.faults.delay, {"success": success})
-        # The answer goes out first, the work follows: what is measured ends with the answer.
+        # The answer is sent before the mode is entered, because the measured time ends with the answer.
         self._under_way += 1
         self.node.after(0.0, lambda: self._done(function, mode, success, reaction))
         return {"success": success}
@@ -175,13 +175,13 @@ class ModeManager:
             self.systems[function].enter(mode)
 
     def switch(self, function: str, mode: str) -> None:
-        """Somebody else switches: the same events, but nobody has asked."""
+        """Switches a mode without a request, with the same events, as another node would."""
         self.systems[function].enter(mode)
         self.oracle.running[function] = mode
 
 
 class Remote:
-    """A mode manager in a process of its own."""
+    """A mode manager in its own process."""
 
     def __init__(self, vendor: str, domain: int, modes: dict[str, str] | None = None) -> None:
         command = [sys.executable, __file__, "--vendor", vendor, "--domain", str(domain)]
@@ -192,26 +192,26 @@ class Remote:
         self.requests: list[tuple[str, str]] = []
 
     def poll(self) -> None:
-        """Reads what was asked for since the last time."""
+        """Reads the requests since the last call."""
         chunk = self._process.stdout.read(1 << 16) or b""
         *lines, self._rest = (self._rest + chunk).split(b"\n")
         self.requests += [tuple(json.loads(line)) for line in lines if line]
 
     def kill(self) -> None:
-        """Gone without a word."""
+        """Kills the process, so that it does not leave the DDS domain properly."""
         self.poll()
         self._process.kill()
         self._process.wait()
 
     def leave(self) -> None:
-        """Gone, with leave taken."""
+        """Ends the process, so that it leaves the DDS domain properly."""
         self._process.stdin.close()
         self._process.wait(10)
         self.poll()
 
 
 def main() -> None:
-    """Serves until its input ends; a request is a line of output."""
+    """Serves until the standard input ends. Prints each request as one line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--vendor", default="cyclonedds")
     parser.add_argument("--domain", type=int, default=0)

@@ -1,12 +1,12 @@
-"""Which mode is right for each function of SUAVE, and what was asked for instead.
+"""Determines the right mode of each function of SUAVE, and finds wrong requests.
 
-The definitions (SUAVE's knowledge base and exemplar): the three spirals need a water visibility of at least 3.25,
-2.25 and 1.25 m, and the higher one is the better one; all thrusters are used while none has failed, and recovered
-otherwise; with a quarter of the battery or less the robot recharges before it does anything else.
+The definitions (SUAVE's knowledge base and exemplar): the three spirals need a water visibility of at least 3.25, 2.25
+and 1.25 m, and a higher one is better; all thrusters are used while none has failed, and recovered otherwise; at a
+quarter of the battery or less the robot recharges before anything else.
 
-Assumed, where the definitions are silent: below 1.25 m no spiral is right, and SUAVE's managers then either keep the
-running one (as MROS does: its plan is empty) or unground the function; both are accepted, nothing is demanded. A
-function that the task does not need may be ungrounded once more, or not be mentioned.
+An assumption, because the definitions do not say it: below 1.25 m no spiral is right, and SUAVE's managers then either
+keep the running one (as MROS does: its plan is empty) or unground the function; both are accepted, and nothing is
+required. A function that the task does not need may be ungrounded again, or get no request.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ BATTERY_LIMIT = 0.25
 
 @dataclass
 class World:
-    """What the monitors have said, and the running task."""
+    """The measured state of the world and the running task."""
 
     task: str | None = None
     visibility: float | None = None
@@ -37,12 +37,12 @@ class World:
     refused: set[str] = field(default_factory=set)  # designs that the mode manager does not grant
 
     def spiral(self) -> str | None:
-        """The best spiral that the water allows; the best one of all before anything was measured."""
+        """Returns the best spiral that the water allows. Before the first measurement, all spirals are allowed."""
         seen = float("inf") if self.visibility is None else self.visibility
         return next((mode for least, mode in SPIRALS if seen >= least and mode not in self.refused), None)
 
     def right(self) -> dict[str, str | None]:
-        """For each function its one right mode; `None` where nothing can be right."""
+        """Returns the right mode of each function, or `None` if no mode is right."""
         modes: dict[str, str | None] = dict.fromkeys((MOTION, PATH, FOLLOW, RECHARGE), UNGROUND)
         if self.task is None:
             return modes
@@ -58,7 +58,7 @@ class World:
 
 @dataclass
 class Reaction:
-    """One right switch: from the stamp of the stimulus to the request, and to the answer (s)."""
+    """A correct switch, with the times from the stamp of the stimulus to the request and to the answer (s)."""
 
     cause: str
     function: str
@@ -86,17 +86,17 @@ class Oracle:
     _late: set[tuple[str, str]] = field(default_factory=set)
 
     def stimulus(self, cause: str, stamp: float, diagnostic: bool = False) -> None:
-        """Call after the world has changed, before the system under test can know."""
+        """Records a stimulus. Call it after the world has changed, before the system under test can know."""
         self.stimuli += diagnostic
         if self.due():
             self._cause, self._since, self._diagnostic = cause, stamp, diagnostic
 
     def next_run(self) -> Oracle:
-        """An oracle for the next run with the same robot: what is measured and what runs stays as it is."""
+        """Returns an oracle for the next run with the same robot. The measured values and running modes are kept."""
         return Oracle(world=self.world, running=self.running)
 
     def due(self) -> dict[str, str]:
-        """The switches that are right and not yet made."""
+        """Returns the correct switches that have not been made."""
         return {
             function: mode
             for function, mode in self.world.right().items()
@@ -104,11 +104,11 @@ class Oracle:
         }
 
     def awaited(self) -> bool:
-        """Whether something is due that has not been given up."""
+        """Returns `True` if a switch is due and was not given up."""
         return any((function, mode) not in self._late for function, mode in self.due().items())
 
     def request(self, function: str, mode: str) -> Reaction | None:
-        """Judges a request; the reaction that it is, if it is one."""
+        """Judges a request. Returns the reaction if the request is correct."""
         right = self.world.right().get(function)
         at = time.time()
         if self.running.get(function) == mode:
@@ -126,7 +126,7 @@ class Oracle:
         return reaction
 
     def answered(self, function: str, mode: str, success: bool, reaction: Reaction | None) -> None:
-        """Call when the request was answered."""
+        """Records the answer to a request."""
         if success:
             self.running[function] = mode
             self._late = {late for late in self._late if late[0] != function}
@@ -134,7 +134,7 @@ class Oracle:
             reaction.answered = time.time() - reaction.since
 
     def give_up(self) -> None:
-        """Call when the time for what is due has passed: it counts as missed, once."""
+        """Records each switch that is still due as missed, once. Call it when their time has passed."""
         for function, mode in self.due().items():
             if (function, mode) not in self._late:
                 self._late.add((function, mode))

@@ -1,4 +1,4 @@
-"""Those who carry out actions of a plan: a performer of PlanSys2 on `actions_hub`, Nav2's server, PlanSys2's executor."""
+"""Nodes that perform actions of a plan: a PlanSys2 performer on `actions_hub`, Nav2's server, PlanSys2's executor."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HUB_QOS = Qos(100)
 
 @dataclass
 class Performer:
-    """A node of PlanSys2's ActionExecutorClient: answers a request, and works when it is confirmed."""
+    """A node of PlanSys2's ActionExecutorClient. It responds to a request, and works after the confirmation."""
 
     node: Node
     action: str
@@ -46,13 +46,13 @@ class Performer:
         self._hub.send({"type": kind, **words, "completion": completion, "success": success})
 
     def types(self) -> list[int]:
-        """What was heard, by type."""
+        """Returns the types of the received messages."""
         return [kind for kind, _, _ in self.heard]
 
 
 @dataclass
 class Navigator:
-    """Nav2's bt_navigator as far as a client sees it."""
+    """Nav2's bt_navigator, as a client sees it."""
 
     node: Node
     poses: list[Any] = field(default_factory=list)
@@ -71,7 +71,7 @@ class Navigator:
 
 @dataclass
 class Executor:
-    """PlanSys2's executor: takes a plan, reports each action and ends."""
+    """PlanSys2's executor. It accepts a plan, reports each action and ends."""
 
     node: Node
     plans: list[list[tuple[float, str, float]]] = field(default_factory=list)
@@ -92,7 +92,7 @@ class Executor:
 
 
 def settings_with(program: Program, tables: dict[str, str]) -> str:
-    """The example's settings with other tables for some actions, as a file of the program."""
+    """Writes the settings of the example, with other tables for some actions, to a file and returns its path."""
     kept, inside = [], ""
     for line in MISSION.with_name("ros.toml").read_text().splitlines():
         if line.startswith("["):
@@ -107,7 +107,7 @@ def settings_with(program: Program, tables: dict[str, str]) -> str:
 
 @scenario()
 def performed(setting: Setting) -> str:
-    """A performer of PlanSys2 searches, and Nav2 goes to the pipeline: the tasks end when these do."""
+    """A PlanSys2 performer does the search and Nav2 goes to the pipeline. The tasks end with them."""
     tables = {"search_pipeline": 'by = "actions_hub"', "inspect_pipeline": 'by = "navigate_to_pose"\npose = 5'}
     with play(setting, prepare=lambda program: ["--settings", settings_with(program, tables)]) as (robot, _):
         node = robot.node

@@ -21,7 +21,7 @@ DOMAIN = """(define (domain ways)
  (:action go :parameters (?p ?q - place)
   :precondition (and (at ?p) (way ?p ?q))
   :effect (and (not (at ?p)) (at ?q) (increase (total-cost) (price ?p ?q)))))"""
-# The straight way costs 10; by way of c it is 3 + 3.
+# The direct path costs 10; the path through c costs 3 + 3.
 PROBLEM = """(define (problem trip) (:domain ways)
  (:objects a b c d - place)
  (:init (at a) (way a b) (way a c) (way c b) (= (total-cost) 0)
@@ -42,7 +42,7 @@ TRIP = """(define (problem trip) (:domain timed) (:objects a b c - place)
 
 @contextmanager
 def planner(setting: Setting) -> Iterator[tuple[Node, Program]]:
-    """A node and the program as planner, brought to active as plansys2_lifecycle_manager does."""
+    """Yields a node and the program as planner, in the state active, which plansys2_lifecycle_manager also sets."""
     program = Program(setting.program, "planner", setting.vendor, setting.domain)
     setting.programs.append(program)
     node = Node(connect(setting.vendor, setting.domain), "executor")
@@ -71,13 +71,13 @@ def planner(setting: Setting) -> Iterator[tuple[Node, Program]]:
 
 
 def steps(plan: Any) -> list[str]:
-    """The actions of a plan in the order of their start."""
+    """Returns the actions of a plan in the order of their start."""
     return [item.action for item in sorted(plan.items, key=lambda item: item.time)]
 
 
 @scenario()
 def planner_node(setting: Setting) -> str:
-    """get_plan honours the metric; what has no plan, and what is not PDDL, is refused with a reason."""
+    """`get_plan` uses the metric, and refuses unsolvable problems and invalid PDDL with a reason."""
     with planner(setting) as (node, _):
         get_plan = node.client("/planner/get_plan", "plansys2_msgs/srv/GetPlan")
         began = time.monotonic()

@@ -1,4 +1,4 @@
-"""Scenarios about MROS's side of the program: the action `/mros/objective`."""
+"""Scenarios in which the program replaces MROS's reasoner: the action `/mros/objective`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from transport import connect
 
 @scenario()
 def objectives(setting: Setting) -> str:
-    """Feedback tells the design of each objective; an objective is cancelled only when its function could be ungrounded."""
+    """Feedback reports the design of each objective. A cancellation fails if the function cannot be ungrounded."""
     with play(setting, "reasoner") as (robot, _):
         see(robot, CLEAR)
         check(robot.request(SEARCH), "an objective was not accepted")
@@ -53,7 +53,7 @@ def objectives(setting: Setting) -> str:
 
 @scenario()
 def killed_reasoner(setting: Setting) -> str:
-    """kill -9 while there are objectives: they are kept, nothing is asked for twice, and they can be cancelled."""
+    """`kill -9` while there are objectives: they are kept, nothing is requested twice, and they can be cancelled."""
     with play(setting, "reasoner") as (robot, program):
         see(robot, CLEAR)
         check(robot.request(SEARCH), "an objective was not accepted")
@@ -92,7 +92,7 @@ EARLIER = ROOT.parent / "shared" / "tools" / "ros"
 
 
 def _earlier_peer(vendor: str) -> list[str]:
-    """The command of a peer that was written before there was a program to test; it lives for 20 s in domain 0."""
+    """Returns the command of a peer that is older than the program. It runs for 20 s in domain 0."""
     if vendor == "cyclonedds":
         return [sys.executable, str(EARLIER / "peer_cyclone.py"), "20"]
     built = ROOT / "target" / "ros" / "peer_fastdds"
@@ -129,7 +129,7 @@ def _change_state() -> object:
 
 @scenario()
 def earlier_peer(setting: Setting) -> str:
-    """The peer of the first trials is a client of /mros/objective: its goal is accepted and it hears feedback."""
+    """The peer of the first experiments is a client of `/mros/objective`: its goal is accepted and it gets feedback."""
     if not EARLIER.is_dir():
         return f"NOT PLAYED: {EARLIER.relative_to(ROOT.parent)} is not there"
     program = Program(setting.program, "reasoner", setting.vendor, 0)
@@ -143,7 +143,7 @@ def earlier_peer(setting: Setting) -> str:
     writer: object = None
     try:
         node.spin(4.0)
-        # It sends its goal when somebody has changed the state of its node.
+        # The peer sends its goal after the state of its node was changed.
         if setting.vendor == "cyclonedds":
             writer = _change_state()
         else:

@@ -18,14 +18,14 @@ ACCEPTED, EXECUTING, CANCELING, SUCCEEDED, CANCELED, ABORTED = range(1, 7)
 
 
 def now() -> dict[str, int]:
-    """builtin_interfaces/Time of this moment."""
+    """Returns the current time as a builtin_interfaces/Time."""
     sec, nanosec = divmod(time.time_ns(), 10**9)
     return {"sec": sec, "nanosec": nanosec}
 
 
 @dataclass
 class Later:
-    """An answer that a service gives after `delay` seconds."""
+    """An answer that a service sends after `delay` seconds."""
 
     delay: float
     value: dict[str, Any]
@@ -43,17 +43,17 @@ class Publisher:
         self._writer.write(codec.encode(self._type, value))
 
     def raw(self, octets: bytes) -> None:
-        """Publishes octets as they are, with their encapsulation header."""
+        """Publishes octets, which include their encapsulation header, unchanged."""
         self._writer.write(octets)
 
     def matched(self) -> int:
-        """How many subscriptions were discovered."""
+        """Returns the number of discovered subscriptions."""
         return self._writer.matched()
 
 
 @dataclass
 class Call:
-    """A request under way: `value` is there when `done`; `failed` says why an answer cannot be read."""
+    """A pending request. When it is `done`, `value` is the answer, or `failed` is the reason why it is unreadable."""
 
     done: bool = False
     value: Any = None
@@ -61,7 +61,7 @@ class Call:
 
 
 class Client:
-    """Calls a service."""
+    """A client of a service."""
 
     def __init__(self, node: Node, name: str, type_name: str) -> None:
         self._type, self._calls = type_name, {}  # type: str, dict[Any, Call]
@@ -90,12 +90,12 @@ class Client:
         return call
 
     def ready(self) -> bool:
-        """Whether a server was discovered."""
+        """Returns `True` if a server was discovered."""
         return self._requester.ready()
 
 
 class Node:
-    """One participant with one node name; everything happens in `spin`."""
+    """One participant with one node name. All callbacks run in `spin`."""
 
     def __init__(self, transport: Transport, name: str, namespace: str = "/") -> None:
         self.transport, self.name = transport, name
@@ -119,11 +119,11 @@ class Node:
         self.nodes = set().union(*self._graph_of.values())
 
     def publisher(self, name: str, type_name: str, qos: Qos = VOLATILE) -> Publisher:
-        """Advertises a topic."""
+        """Returns a publisher of a topic."""
         return Publisher(self, name, type_name, qos)
 
     def subscribe(self, name: str, type_name: str, on_value: Callable[[Any], None], qos: Qos = VOLATILE) -> Any:
-        """Calls `on_value` with every value of a topic; what cannot be read is noted in `undecodable`."""
+        """Calls `on_value` with each value of a topic. Unreadable samples are added to `undecodable`."""
 
         def take(octets: bytes) -> None:
             try:
@@ -136,11 +136,11 @@ class Node:
         return self.transport.reader("rt/" + name.lstrip("/"), codec.dds_name(type_name), qos, take)
 
     def client(self, name: str, type_name: str) -> Client:
-        """A client of a service."""
+        """Returns a client of a service."""
         return Client(self, name, type_name)
 
     def serve(self, name: str, type_name: str, handler: Callable[[Any], dict[str, Any] | bytes | Later | None]) -> Any:
-        """Serves: a dictionary is the answer, octets are sent as they are, `None` is silence."""
+        """Serves requests. A dictionary is encoded, octets are sent unchanged, and `None` sends no answer."""
 
         def send(key: Any, value: dict[str, Any]) -> None:
             replier.reply(key, codec.encode(f"{type_name}_Response", value))
@@ -160,7 +160,7 @@ class Node:
             elif answer is not None:
                 send(key, answer)
 
-        # The serialiser compiles itself at its first use; no caller should wait for that.
+        # The serialiser is compiled at its first use, which must not delay a caller.
         codec.decode(f"{type_name}_Request", codec.encode(f"{type_name}_Request", {}))
         codec.encode(f"{type_name}_Response", {})
         replier = self.transport.replier(name, type_name, take)
@@ -178,11 +178,11 @@ class Node:
             heapq.heappop(self._timers)[2]()
 
     def spin(self, seconds: float) -> None:
-        """Spins for some time."""
+        """Spins for this time."""
         self.spin_until(lambda: False, seconds)
 
     def spin_until(self, condition: Callable[[], bool], timeout: float) -> bool:
-        """Spins until the condition holds; whether it did in time."""
+        """Spins until the condition is true. Returns `False` on a timeout."""
         end = time.monotonic() + timeout
         while not condition():
             left = end - time.monotonic()
@@ -192,14 +192,14 @@ class Node:
         return True
 
     def close(self) -> None:
-        """Leaves the domain."""
+        """Leaves the DDS domain."""
         self._timers = []
         self.transport.close()
 
 
 @dataclass
 class Goal:
-    """A goal of an action client: what came back so far."""
+    """The goal of an action client, with the answers received."""
 
     goal_id: list[int]
     accepted: bool | None = None
@@ -211,7 +211,7 @@ class Goal:
 
 
 class ActionClient:
-    """Client of an action."""
+    """A client of an action."""
 
     def __init__(self, node: Node, name: str, type_name: str) -> None:
         self._node, base = node, f"{name}/_action"
@@ -230,7 +230,7 @@ class ActionClient:
             goal.feedback.append(message.feedback)
 
     def ready(self) -> bool:
-        """Whether the three services were discovered."""
+        """Returns `True` if the three services were discovered."""
         return self._send.ready() and self._result.ready() and self._cancel.ready()
 
     def send(self, value: dict[str, Any]) -> Goal:
@@ -241,7 +241,7 @@ class ActionClient:
         return goal
 
     def wait_accepted(self, goal: Goal, timeout: float) -> bool:
-        """Whether the goal was accepted; asks for its result then, as rclpy does."""
+        """Returns `True` if the goal was accepted. Then requests its result, as rclpy does."""
         call = goal.calls[0]
         self._node.spin_until(lambda: call.done, timeout)
         goal.accepted = bool(call.value.accepted) if call.value is not None else None
@@ -250,12 +250,12 @@ class ActionClient:
         return bool(goal.accepted)
 
     def cancel(self, goal: Goal) -> Call:
-        """Asks for the cancellation of a goal."""
+        """Requests the cancellation of a goal."""
         goal.cancel = self._cancel.call({"goal_info": {"goal_id": {"uuid": goal.goal_id}}})
         return goal.cancel
 
     def wait_result(self, goal: Goal, timeout: float) -> bool:
-        """Whether the result has come."""
+        """Returns `True` if the result was received in time."""
         call = goal.calls[1]
         self._node.spin_until(lambda: call.done, timeout)
         if call.value is not None:
@@ -264,7 +264,7 @@ class ActionClient:
 
 
 class ActionServer:
-    """Server of an action: `on_goal` accepts or not, the owner sends feedback and the result."""
+    """A server of an action. `on_goal` accepts or refuses a goal; the owner sends feedback and the result."""
 
     def __init__(
         self,
@@ -317,11 +317,11 @@ class ActionServer:
         self._statuses.send({"status_list": entries})
 
     def feedback(self, goal: bytes, value: dict[str, Any]) -> None:
-        """Sends feedback of a goal."""
+        """Sends feedback for a goal."""
         self._feedback.send({"goal_id": {"uuid": list(goal)}, "feedback": value})
 
     def finish(self, goal: bytes, status: int, result: dict[str, Any]) -> None:
-        """Ends a goal."""
+        """Ends a goal with a status and a result."""
         self._results[goal] = {"status": status, "result": result}
         self._set(goal, status)
         self._answer()

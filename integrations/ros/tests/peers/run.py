@@ -28,7 +28,7 @@ SETUP = 'ip link set lo up && ip link set lo multicast on && ip route add 224.0.
 
 
 def enter_namespace() -> None:
-    """Runs this program again in a network namespace of its own."""
+    """Restarts this program in its own network namespace."""
     if os.environ.get(INSIDE):
         return
     missing = [tool for tool in ("unshare", "ip") if shutil.which(tool) is None]
@@ -44,7 +44,7 @@ def enter_namespace() -> None:
 
 
 def play_one(arguments: argparse.Namespace) -> int:
-    """Plays one scenario in this process; its report is a line of JSON."""
+    """Plays one scenario in this process and prints its report as a line of JSON."""
     from catalogue import SCENARIOS, Setting
 
     name, vendor = arguments.one, arguments.vendor
@@ -67,7 +67,7 @@ def play_one(arguments: argparse.Namespace) -> int:
 
 
 def play(name: str, arguments: argparse.Namespace, vendor: str, domain: int) -> dict[str, object]:
-    """Plays one scenario in a process of its own and returns its report."""
+    """Plays one scenario in its own process and returns its report."""
     command = [sys.executable, __file__, "--one", name, "--program", arguments.program]
     command += ["--vendor", vendor, "--domain", str(domain), "--median", str(arguments.median)]
     started = time.monotonic()
@@ -91,7 +91,7 @@ def play(name: str, arguments: argparse.Namespace, vendor: str, domain: int) -> 
 
 
 def chosen(arguments: argparse.Namespace) -> list[tuple[str, str]]:
-    """Scenarios with vendors, in order."""
+    """Returns the selected scenarios with their vendors, in order."""
     from catalogue import QUICK, SCENARIOS
 
     unknown = sorted(set(arguments.scenario) - set(SCENARIOS))
@@ -113,7 +113,7 @@ def chosen(arguments: argparse.Namespace) -> list[tuple[str, str]]:
 
 
 def play_all(arguments: argparse.Namespace) -> list[dict[str, object]]:
-    """What measures time, or has a fixed domain, is played alone, one after the other; what mostly waits is played at the same time."""
+    """Plays scenarios that measure times, or have a fixed domain, one after the other, and the others concurrently."""
     numbered = [(name, vendor, 1 + at % 100) for at, (name, vendor) in enumerate(chosen(arguments))]
     alone = [each for each in numbered if each[0].startswith(MEASURING)]
     reports = [play(name, arguments, vendor, domain) for name, vendor, domain in alone]
@@ -121,7 +121,8 @@ def play_all(arguments: argparse.Namespace) -> list[dict[str, object]]:
     with ThreadPoolExecutor(AT_ONCE) as pool:
         others = [pool.submit(play, name, arguments, vendor, domain) for name, vendor, domain in together]
         results = [other.result() for other in others]
-    # On a busy machine, robots that are played together miss their own deadlines, so a failed one is played again alone.
+    # On a busy machine, robots that are played concurrently miss their own deadlines, so a failed one is played again
+    # alone.
     for (name, vendor, domain), report in zip(together, results, strict=True):
         if not report["passed"]:
             print(f"{name} is played again alone", flush=True)
@@ -131,7 +132,7 @@ def play_all(arguments: argparse.Namespace) -> list[dict[str, object]]:
 
 
 def self_test(arguments: argparse.Namespace) -> int:
-    """Whether the scenarios pass with a right stand-in and fail with each of its faults."""
+    """Checks that the scenarios pass with a correct stand-in, and fail with each fault. Returns the exit status."""
     fooled = []
     for fault, name, expected in (
         ("", "mission-manager", True),
@@ -150,7 +151,7 @@ def self_test(arguments: argparse.Namespace) -> int:
 
 
 def main() -> int:
-    """Plays what is asked for."""
+    """Plays the selected scenarios. The exit status is 1 if one of them failed or none was played."""
     parser = argparse.ArgumentParser(description=__doc__)
     default = ROOT / "target" / "debug" / "metaplan-ros"
     parser.add_argument("scenario", nargs="*", help="names; all without one")

@@ -1,4 +1,4 @@
-"""What is played against the program under test, by name. A scenario raises `AssertionError` when something is wrong."""
+"""The registry of the scenarios, by name. A scenario raises `AssertionError` when a check fails."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CLEAR, MURKY, DARK = 3.5, 2.5, 1.5  # m: high, medium and low spiral
 
 @dataclass
 class Setting:
-    """With what a scenario is played; `results` goes into the report."""
+    """The settings of a scenario. `results` becomes part of the report."""
 
     program: str
     vendor: str
@@ -54,7 +54,7 @@ def play(
     prepare: Callable[[Program], list[str]] = lambda _: [],
     **more: Any,
 ) -> Iterator[tuple[Robot, Program]]:
-    """A robot and the program, discovered by each other unless the caller looks after that."""
+    """Yields a robot and the program. By default, they have discovered each other."""
     program = Program(setting.program, role, setting.vendor, setting.domain, **more)
     setting.programs.append(program)
     program.more += prepare(program)
@@ -76,13 +76,13 @@ def play(
 
 
 def check(condition: bool, message: str) -> None:
-    """An assertion that python -O does not remove."""
+    """An assertion that `python -O` does not remove."""
     if not condition:
         raise AssertionError(message)
 
 
 def faultless(result: dict[str, Any]) -> None:
-    """Nothing wrong, missed or asked for twice, and every task granted."""
+    """Checks that no switch is wrong, missing or requested twice, and that every task was granted."""
     for what in ("wrong", "missed", "twice"):
         check(not result[what], f"{result['stream']}: {what}: {result[what][:5]}")
     tasks = result["tasks"]
@@ -91,7 +91,7 @@ def faultless(result: dict[str, Any]) -> None:
 
 
 def reactions(results: list[dict[str, Any]]) -> str:
-    """The reaction times of several streams in one line."""
+    """Returns one line with the reaction times of several streams."""
     answered = [ms for result in results for ms in result["answered_ms"]]
     stimuli, switches = sum(r["stimuli"] for r in results), sum(r["switches"] for r in results)
     return (
@@ -115,40 +115,40 @@ def _missions(setting: Setting, role: str, chosen: list[streams.Stream]) -> str:
 
 @scenario()
 def mission_manager(setting: Setting) -> str:
-    """Two of the published streams, as the manager of tasks."""
+    """Plays two of the published streams with the program as task manager."""
     return _missions(setting, "manager", [streams.stream(3, 1), streams.stream(3, 6)])
 
 
 @scenario()
 def mission_reasoner(setting: Setting) -> str:
-    """One of the published streams, in the place of MROS's reasoner."""
+    """Plays one of the published streams with the program in place of MROS's reasoner."""
     return _missions(setting, "reasoner", [streams.stream(3, 6)])
 
 
 @scenario(quick=False)
 def published_manager(setting: Setting) -> str:
-    """All eighteen published streams, as the manager of tasks."""
+    """Plays all eighteen published streams with the program as task manager."""
     return _missions(setting, "manager", streams.published())
 
 
 @scenario(quick=False)
 def published_reasoner(setting: Setting) -> str:
-    """All eighteen published streams, in the place of MROS's reasoner."""
+    """Plays all eighteen published streams with the program in place of MROS's reasoner."""
     return _missions(setting, "reasoner", streams.published())
 
 
 def see(robot: Robot, metres: float) -> bool:
-    """The water visibility is measured; whether the robot settled."""
+    """Publishes a measured water visibility. Returns `True` if the robot settled."""
     return robot.play(Stimulus(0, "visibility", metres))
 
 
 def no_fault(robot: Robot) -> None:
-    """Nothing wrong, missed or asked for twice so far."""
+    """Checks that no switch is wrong, missing or requested twice."""
     oracle = robot.oracle
     for what, found in (("wrong", oracle.wrong), ("missed", oracle.missed), ("twice", oracle.twice)):
         check(not found, f"{what}: {found[:5]}")
 
 
 def asked(robot: Robot, function: str) -> list[str]:
-    """The modes asked for of a function, in order."""
+    """Returns the requested modes of a function, in order."""
     return [mode for _, of, mode in robot.modes.requests if of == function]

@@ -17,7 +17,7 @@ from transport import connect
 
 
 class StandIn:
-    """Keeps a world of its own from the diagnostics and switches what is not as it should be."""
+    """A manager that keeps its own `World` from the diagnostics and switches each function that has a wrong mode."""
 
     def __init__(self, node: Node, role: str, fault: str) -> None:
         self.node, self.role, self.fault = node, role, fault
@@ -38,7 +38,7 @@ class StandIn:
             self.server = ActionServer(node, name, kind, self.goal, self.cancel)
 
     def ask(self, function: str, mode: str) -> None:
-        """Asks for a mode without waiting."""
+        """Requests a mode without waiting for the answer."""
         if self.fault == "slow":
             time.sleep(0.05)
         for _ in range(2 if self.fault == "twice" else 1):
@@ -51,7 +51,7 @@ class StandIn:
         self.running[function] = mode
 
     def adapt(self) -> None:
-        """Makes every wanted function right."""
+        """Switches each wanted function to its right mode."""
         self.world.task = SEARCH if PATH in self.wanted else "inspect_pipeline"
         right = self.world.right()
         for function in (MOTION, PATH, FOLLOW, "generate_recharge_path"):
@@ -64,7 +64,7 @@ class StandIn:
                 self.ask(function, mode)
 
     def hear(self, message: Any) -> None:
-        """A diagnostic."""
+        """Processes a message of `/diagnostics`."""
         for status in message.status:
             for pair in status.values[:1]:
                 if pair.key == "water_visibility":
@@ -79,26 +79,26 @@ class StandIn:
             self.adapt()
 
     def task(self, request: Any) -> dict[str, Any]:
-        """/task/request"""
+        """Serves `/task/request`."""
         self.wanted = set(FUNCTIONS[request.task_name])
         self.adapt()
         return {"success": True}
 
     def end(self, _: Any) -> dict[str, Any]:
-        """/task/cancel"""
+        """Serves `/task/cancel`."""
         self.wanted = set()
         self.adapt()
         return {"success": True}
 
     def goal(self, goal: bytes, value: Any) -> bool:
-        """A new objective."""
+        """Accepts a new objective."""
         self.goals[goal] = value.qos_expected.objective_type
         self.wanted.add(self.goals[goal])
         self.node.after(0.0, self.adapt)
         return True
 
     def cancel(self, goal: bytes) -> bool:
-        """An objective that is no longer wanted."""
+        """Cancels an objective."""
         function = self.goals.pop(goal)
         self.wanted.discard(function)
         self.ask(function, UNGROUND)
@@ -107,7 +107,7 @@ class StandIn:
 
 
 def main() -> None:
-    """Runs until it is killed."""
+    """Runs for ten minutes, unless it is killed earlier."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--as", dest="role", default="manager")
     parser.add_argument("--vendor", default="cyclonedds")

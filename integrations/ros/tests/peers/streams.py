@@ -23,7 +23,7 @@ FAILING = (1, 3)  # thrusters, in the order in which they fail
 
 @dataclass(frozen=True)
 class Draw:
-    """One start (m) with its shift of the visibility (s) and offset of the failures (s)."""
+    """A start (m) with its shift of the visibility (s) and offset of the failures (s)."""
 
     y: float
     shift: float
@@ -32,7 +32,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class Stimulus:
-    """What a monitor says `second` seconds after GUIDED: `visibility` (m), `battery` (share) or `failure` (thruster)."""
+    """A report `second` seconds after GUIDED: `visibility` (m), `battery` (share) or `failure` (thruster)."""
 
     second: float
     kind: str
@@ -41,7 +41,7 @@ class Stimulus:
 
 @dataclass(frozen=True)
 class Stream:
-    """One published run: an experiment (1 thrusters, 2 visibility, 3 both) and a draw (1 to 6)."""
+    """A published run: an experiment (1 thrusters, 2 visibility, 3 both) and a draw (1 to 6)."""
 
     experiment: int
     draw: int
@@ -53,7 +53,7 @@ class Stream:
 
 
 def draws() -> list[Draw]:
-    """The draws of the recorded runs 1-5, 6-10, and so on."""
+    """Returns the draws of the recorded runs 1-5, 6-10, and so on."""
     generator = random.Random(SEED)
     found = []
     for _ in range(DRAWS):
@@ -65,20 +65,20 @@ def draws() -> list[Draw]:
 
 
 def visibility(second: int, shift: float) -> float:
-    """SUAVE's observer, at whole seconds since GUIDED."""
+    """Returns the water visibility (m) of SUAVE's observer, at whole seconds since GUIDED."""
     half = (HIGHEST - LOWEST) / 2
     return half * math.cos(2 * math.pi / PERIOD * (second + shift)) + half + LOWEST
 
 
 def _at_second(second: int, experiment: int, draw: Draw) -> Iterator[Stimulus]:
-    # Without variation the water stays clear. The battery is reported, too, and never comes near its limit here.
+    # Without variation the water stays clear. The battery is also reported, and never comes near its limit here.
     shown = HIGHEST if experiment == 1 else visibility(second, draw.shift)
     yield Stimulus(second, "visibility", shown)
     yield Stimulus(second, "battery", 1.0 - second / 1000)
 
 
 def stream(experiment: int, number: int) -> Stream:
-    """The stimuli of one run in the order of time."""
+    """Returns the stimuli of one run in the order of time."""
     draw = draws()[number - 1]
     found = [stimulus for second in range(DURATION) for stimulus in _at_second(second, experiment, draw)]
     if experiment != 2:
@@ -90,12 +90,12 @@ def stream(experiment: int, number: int) -> Stream:
 
 
 def published() -> list[Stream]:
-    """All eighteen."""
+    """Returns all eighteen published streams."""
     return [stream(experiment, number) for experiment in (1, 2, 3) for number in range(1, DRAWS + 1)]
 
 
 def battery_run() -> Stream:
-    """Our own: the battery falls below a quarter while the robot searches in clear water, at second 31."""
+    """Returns our own stream: at second 31, during the search in clear water, the battery falls below a quarter."""
     found = []
     for second in range(60):
         found.append(Stimulus(second, "visibility", HIGHEST))

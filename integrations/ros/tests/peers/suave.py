@@ -28,11 +28,11 @@ FUNCTIONS = {SEARCH: (MOTION, PATH), INSPECT: (MOTION, FOLLOW)}
 
 
 class Monitors:
-    """The water visibility observer, the battery monitor and the thruster monitor on `/diagnostics`."""
+    """Publishes as SUAVE's water visibility observer, battery monitor and thruster monitor on `/diagnostics`."""
 
     def __init__(self, node: Node) -> None:
         self.topic = node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
-        # The serialiser compiles itself at its first use; this is not part of any reaction.
+        # The serialiser is compiled at its first use, which must not be part of a reaction time.
         self._send([], now())
         self._send([self._status(OK, "warm", "up", [("a", "b")])], now())
 
@@ -45,39 +45,39 @@ class Monitors:
         self.topic.send({"header": {"stamp": stamp, "frame_id": ""}, "status": status})
 
     def nothing(self) -> None:
-        """A message without a status."""
+        """Publishes a message without a status."""
         self._send([], now())
 
     def visibility(self, metres: float, stamp: dict[str, int]) -> None:
-        """As water_visibility_observer says it."""
+        """Publishes the water visibility as water_visibility_observer does."""
         name = "water_visibility_observer: Water visibility measurement"
         self._send([self._status(OK, name, "QA status", [("water_visibility", str(metres))])], stamp)
 
     def battery(self, share: float, stamp: dict[str, int]) -> None:
-        """As battery_monitor says it."""
+        """Publishes the battery level as battery_monitor does."""
         name = "battery_monitor: Battery level"
         self._send([self._status(OK, name, "QA status", [("battery_level", str(share))])], stamp)
 
     def thruster(self, number: int, works: bool, stamp: dict[str, int]) -> None:
-        """As thruster_monitor says it: Metacontrol's word and PLANTA's word under the same key."""
+        """Publishes a thruster's state like thruster_monitor: Metacontrol's and PLANTA's words have the same key."""
         level, words = (OK, ("RECOVERED", "OK")) if works else (ERROR, ("FALSE", "ERROR"))
         values = [(f"c_thruster_{number}", word) for word in words]
         self._send([self._status(level, "thruster_monitor: Thruster status", "Component status", values)], stamp)
 
 
 def seconds(stamp: dict[str, int]) -> float:
-    """A stamp as seconds since the epoch."""
+    """Converts a stamp to seconds since the epoch."""
     return stamp["sec"] + stamp["nanosec"] / 1e9
 
 
 def streams_end(stream: Stream) -> float:
-    """The second after the last stimulus."""
+    """Returns the second after the last stimulus."""
     return stream.stimuli[-1].second + 1
 
 
 @dataclass
 class Options:
-    """How a robot is played."""
+    """The options for playing a robot."""
 
     role: str = "manager"
     vendor: str = "cyclonedds"
@@ -89,14 +89,14 @@ class Options:
 
 @dataclass
 class Objectives:
-    """MROS's task bridge: one ControlQos goal for each function of the task."""
+    """Simulates MROS's task bridge: one ControlQos goal for each function of the task."""
 
     client: ActionClient
     goals: dict[str, Goal] = field(default_factory=dict)
     count: int = 0
 
     def send(self, function: str) -> Goal:
-        """Asks for a function, as SUAVE's task_bridge_metacontrol does."""
+        """Requests a function, as SUAVE's task_bridge_metacontrol does."""
         self.count += 1
         wanted = {
             "objective_id": f"obj_{function}_{self.count}",
@@ -135,7 +135,7 @@ class Robot:
         return self.node.publisher(name, "std_msgs/msg/Bool")
 
     def wait(self, timeout: float = 20.0) -> bool:
-        """Whether the system under test has been discovered in time."""
+        """Returns `True` if the system under test was discovered before the timeout."""
 
         def there() -> bool:
             if self.objectives is not None:
@@ -146,26 +146,27 @@ class Robot:
 
         found = self.node.spin_until(there, timeout)
         if self.options.vendor == "fastrtps":
-            # A reader of RustDDS hands on nothing until it knows where the writer begins. If it met the writer too late for the
-            # first heartbeat of Fast DDS, it knows with the one that follows a sample: what is said until then is late, and in
-            # order. So something is said that changes nothing, and waited for that heartbeat.
+            # A reader of RustDDS delivers nothing until it knows the first sequence number of the writer. If it was
+            # discovered too late for the first heartbeat of Fast DDS, the next heartbeat follows a sample; earlier
+            # samples are then delivered late, in order. So a message without effect is sent first, and its heartbeat is
+            # awaited.
             self.monitors.nothing()
             self.node.spin(HEARTBEAT)
         return found
 
     def show(self, metres: float) -> None:
-        """The water visibility is measured, and nothing judged."""
+        """Publishes a measured water visibility that the oracle does not judge."""
         self.oracle.world.visibility = metres
         self.monitors.visibility(metres, now())
 
     def guided(self) -> None:
-        """The autopilot reports GUIDED: the mission begins."""
+        """Publishes the autopilot mode GUIDED, which starts the mission."""
         header = {"stamp": now(), "frame_id": ""}
         fields = {"connected": True, "armed": True, "guided": True, "mode": "GUIDED", "system_status": 4}
         self.state.send({"header": header, **fields})
 
     def settle(self) -> bool:
-        """Spins until all that is due has been asked for and answered, and a moment longer."""
+        """Spins until all due switches are requested and answered, and then a short time longer."""
         done = self.node.spin_until(
             lambda: not self.oracle.awaited() and self.modes.idle(), self.options.reaction_limit
         )
@@ -175,7 +176,7 @@ class Robot:
         return done
 
     def request(self, task: str) -> bool:
-        """The mission node asks for a task; whether it was granted within five seconds."""
+        """Requests a task as the mission node. Returns `True` if it was granted in time."""
         self.oracle.world.task = task
         self.oracle.stimulus(f"request of {task}", time.time())
         if self.objectives is not None:
@@ -189,7 +190,7 @@ class Robot:
         return granted
 
     def cancel(self, task: str) -> bool:
-        """The mission node ends a task; whether this was confirmed within five seconds."""
+        """Ends a task as the mission node. Returns `True` if this was confirmed in time."""
         self.oracle.world.task = None
         self.oracle.stimulus(f"cancellation of {task}", time.time())
         if self.objectives is not None:
@@ -210,7 +211,7 @@ class Robot:
         return self.objectives.client.wait_result(goal, TASK_TIMEOUT) and goal.status == 5
 
     def play(self, stimulus: Stimulus) -> bool:
-        """Sends one stimulus; whether the robot settled."""
+        """Sends one stimulus. Returns `True` if the robot settled."""
         world = self.oracle.world
         if stimulus.kind == "visibility":
             world.visibility = stimulus.value
@@ -220,7 +221,7 @@ class Robot:
             world.failed.add(int(stimulus.value))
         else:
             world.failed.discard(int(stimulus.value))
-        # The decision what is right is not part of the reaction: the stamp is taken after it.
+        # The calculation of the right modes is not part of the reaction, so the stamp is taken after it.
         stamp = now()
         self.oracle.stimulus(
             f"{stimulus.kind} {stimulus.value:g} at {stimulus.second:g} s", seconds(stamp), diagnostic=True
@@ -234,17 +235,17 @@ class Robot:
         return self.settle()
 
     def recover(self, second: float) -> None:
-        """The recovery has done its work: the thrusters report it, one after the other."""
+        """Ends the recovery: the thrusters report it, one after the other."""
         for thruster in sorted(self.oracle.world.failed):
             self.play(Stimulus(second, "recovered", thruster))
 
     def done(self, what: str) -> None:
-        """The task has reached its aim: its functions may be ungrounded now, and have to be when it is cancelled."""
+        """Ends the task: its functions may be ungrounded from here on, and must be when it is cancelled."""
         self.oracle.world.task = None
         self.oracle.stimulus(what, time.time())
 
     def mission(self, stream: Stream) -> dict[str, Any]:
-        """One whole mission with an oracle of its own: search, detection, inspection; the stimuli of the stream all along."""
+        """Plays one mission with its own oracle: search, detection and inspection, with the stimuli of the stream."""
         started, tasks, current = time.monotonic(), [], SEARCH
         self.oracle = self.modes.oracle = self.oracle.next_run()
         self.guided()
@@ -269,7 +270,7 @@ class Robot:
         return self.summary(stream.name, tasks, time.monotonic() - started)
 
     def summary(self, name: str, tasks: list[bool], took: float) -> dict[str, Any]:
-        """What the oracle has seen."""
+        """Returns the results of the oracle."""
         oracle = self.oracle
         diagnostic = [r for r in oracle.reactions if r.diagnostic and r.answered is not None]
         return {
@@ -288,5 +289,5 @@ class Robot:
         }
 
     def close(self) -> None:
-        """Leaves the domain."""
+        """Leaves the DDS domain."""
         self.node.close()

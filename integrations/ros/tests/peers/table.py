@@ -1,4 +1,4 @@
-"""Mean reaction times of other managers in SUAVE, as published, beside those of a run of ours.
+"""Compares the published mean reaction times of other managers in SUAVE with those of our runs.
 
     python table.py ../shared/real/suave_results report.json
 
@@ -27,7 +27,7 @@ two compare the time that a manager needs, not the time that a robot needs."""
 
 
 def recorded(directory: Path, experiment: int, manager: str) -> list[float]:
-    """The mean reaction time of each published run in which something was reacted to, in s."""
+    """Returns the mean reaction time (s) of each published run with at least one reaction."""
     path = directory / f"exp{experiment}-{manager}.csv"
     with path.open(newline="") as file:
         values = [float(row["mean reaction time (s)"]) for row in csv.DictReader(file)]
@@ -35,7 +35,7 @@ def recorded(directory: Path, experiment: int, manager: str) -> list[float]:
 
 
 def ours(report: list[dict[str, object]], experiment: int, role: str, vendor: str) -> list[list[float]]:
-    """The reactions of each of our runs in ms."""
+    """Returns the reaction times (ms) of each of our runs."""
     return [
         result["answered_ms"]
         for scenario in report
@@ -60,7 +60,7 @@ def main() -> int:
         for vendor in ("cyclonedds", "fastrtps"):
             for role in ("manager", "reasoner"):
                 runs = ours(report, experiment, role, vendor)
-                # Like theirs: one number for each run, its mean.
+                # The mean of each run, as in the published results.
                 means = [statistics.mean(run) for run in runs if run]
                 if means:
                     row(experiment, what, f"Metaplan as {role}, {vendor}", len(means), means)
@@ -74,7 +74,7 @@ def main() -> int:
 
 
 def row(experiment: int, what: str, manager: str, runs: int, values: list[float]) -> None:
-    """One line of the table."""
+    """Prints one line of the table."""
     figures = (statistics.mean(values), statistics.median(values), min(values), max(values))
     print(f"| {experiment} {what} | {manager} | {runs} | " + " | ".join(f"{figure:.1f}" for figure in figures) + " |")
 

@@ -1,4 +1,4 @@
-"""The oracle by hand: thresholds, failures, and what it must not let pass."""
+"""Tests of the oracle with values calculated by hand: thresholds, failures, and requests that it has to reject."""
 
 import time
 import unittest

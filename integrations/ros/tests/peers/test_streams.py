@@ -1,4 +1,4 @@
-"""The regenerated draws against the published table, and the formula at points that can be done by hand."""
+"""Tests of the regenerated draws against the published table, and of the formula at points calculated by hand."""
 
 import unittest
 

@@ -1,6 +1,6 @@
-"""What every DDS library has to do for a peer: CDR octets in and out, and who asked for what.
+"""The interface of a DDS library for a peer: CDR octets in both directions, and the identification of requests.
 
-Octets always carry the encapsulation header. `key` identifies a request; only its transport knows what is in it.
+Octets always include the encapsulation header. `key` identifies a request; its content is private to the transport.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from codec import dds_name
 
 @dataclass(frozen=True)
 class Qos:
-    """ROS's profiles as far as peers use them: reliable, keep last `depth`."""
+    """The parts of ROS's QoS profiles that the peers use: reliable, keep last `depth`."""
 
     depth: int = 10
     transient_local: bool = False
@@ -32,30 +32,30 @@ class Writer(Protocol):
     def write(self, octets: bytes) -> None: ...
 
     def matched(self) -> int:
-        """How many readers were discovered."""
+        """Returns the number of discovered readers."""
 
 
 class Requester(Protocol):
-    """The client's half of a service."""
+    """The client side of a service."""
 
     def request(self, octets: bytes) -> Any:
         """Sends a request and returns its key."""
 
     def ready(self) -> bool:
-        """Whether a server was discovered in both directions."""
+        """Returns `True` if a server was discovered in both directions."""
 
 
 class Replier(Protocol):
-    """The server's half of a service."""
+    """The server side of a service."""
 
     def reply(self, key: Any, octets: bytes) -> None: ...
 
     def ready(self) -> bool:
-        """Whether a client was discovered in both directions."""
+        """Returns `True` if a client was discovered in both directions."""
 
 
 class Transport(Protocol):
-    """One participant of a DDS domain."""
+    """A participant of a DDS domain."""
 
     def writer(self, topic: str, type_name: str, qos: Qos) -> Writer: ...
 
@@ -66,17 +66,17 @@ class Transport(Protocol):
     def replier(self, service: str, type_name: str, on_request: OnKeyed) -> Replier: ...
 
     def poll(self, timeout: float) -> None:
-        """Waits at most `timeout` seconds for something to read, and hands it to the callbacks."""
+        """Waits at most `timeout` seconds for data, and passes it to the callbacks."""
 
     def close(self) -> None:
-        """Leaves the domain and says so."""
+        """Leaves the domain and announces this."""
 
     def gid(self) -> bytes:
-        """Sixteen octets that identify the participant."""
+        """Returns sixteen octets that identify the participant."""
 
 
 def service_names(service: str, type_name: str) -> tuple[tuple[str, str], tuple[str, str]]:
-    """Topic and DDS type of the requests and of the replies of `/service`."""
+    """Returns topic and DDS type of the requests, and of the replies, of `/service`."""
     name = service.lstrip("/")
     return (
         (f"rq/{name}Request", dds_name(f"{type_name}_Request")),
@@ -85,7 +85,7 @@ def service_names(service: str, type_name: str) -> tuple[tuple[str, str], tuple[
 
 
 def connect(vendor: str, domain: int) -> Transport:
-    """A participant of the vendor `cyclonedds` or `fastrtps`."""
+    """Returns a participant of the vendor `cyclonedds` or `fastrtps`."""
     if vendor == "cyclonedds":
         from cyclone import Cyclone
 

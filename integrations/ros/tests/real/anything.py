@@ -149,7 +149,7 @@ def any_service() -> None:
 
 
 def selector() -> None:
-    """A latched message selects a planner; another node's message is noticed, and a planner that does not follow is a failure."""
+    """A latched message selects a planner. A message of another node is detected, and a planner that does not follow is a failure."""
     settings = STEPS.replace(DRIVING, SELECTING)
     scout, controllers = Scout(), Controllers()
     with nodes(controllers), scout.managed(settings):

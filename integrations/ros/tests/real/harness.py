@@ -40,7 +40,7 @@ PROGRAM = pathlib.Path(sys.argv[1]).resolve()
 
 
 class Failure(AssertionError):
-    """What a scenario has found."""
+    """A failed check of a scenario."""
 
 
 def check(found: object, expected: object, what: str) -> None:
@@ -176,7 +176,7 @@ class Scout:
         self.until(f"amcl is {amcl}, visual localization is {visual}", lambda: self.states() == (amcl, visual), within)
 
     def until_moving(self) -> None:
-        """Waits until the robot localizes with the lidar and the manager knows that its steps have succeeded."""
+        """Waits until the robot localizes with the lidar and the manager has recorded the success of its steps."""
         self.until_states("active", "inactive")
         states = lambda: [event["state"] for event in self.events if event["answer"] == "state"]
         self.until("the action is executed", lambda: states()[-1:] == ["EXECUTE"])

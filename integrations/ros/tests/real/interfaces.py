@@ -39,7 +39,8 @@ PACKAGE = """<?xml version="1.0"?>
 </package>
 """
 
-# What rclpy on Fast DDS needs. `rosidl_default_generators` would also generate and compile messages for C++, and introspection.
+# Generators that rclpy on Fast DDS needs. `rosidl_default_generators` would also generate and compile messages for C++,
+# and introspection.
 GENERATORS = (
     "rosidl_cmake",
     "rosidl_generator_type_description",
@@ -51,7 +52,7 @@ GENERATORS = (
     "rosidl_generator_py",
 )
 
-# Packages that the definitions refer to, beside their own.
+# Packages that the definitions refer to, in addition to their own.
 DEPENDENCIES = {
     "controller_manager_msgs": ["builtin_interfaces"],
     "nav2_msgs": ["action_msgs", "builtin_interfaces", "geometry_msgs", "nav_msgs"],

@@ -4,7 +4,7 @@
     python run.py METAPLAN_ROS --cold-starts N
 
 The second form starts each role N times, with a new client each time; it is not part of CI. Each scenario uses a ROS domain
-of its own and starts the program anew. Exits with 1 if a scenario fails.
+of its own and starts a new process of the program. Exits with 1 if a scenario fails.
 """
 
 import functools
@@ -457,7 +457,7 @@ def silent_signal() -> None:
 
 
 def simulated_time() -> None:
-    """With `use_sim_time`, a filter waits for simulated seconds: the recovery of a component takes effect when the simulation says so."""
+    """With `use_sim_time`, a filter waits for simulated seconds: the recovery of a component takes effect in simulated time."""
     scout, now, step = Scout(), [1000.0], [0.01]
     clock = scout.equipment.create_publisher(Clock, "/clock", qos_profile_sensor_data)
     stopped = threading.Event()
@@ -501,7 +501,7 @@ def simulated_time() -> None:
 
 
 def discover() -> None:
-    """The settings that are written name what the robot has, and can be used as they are."""
+    """The written settings contain the parts of the robot, and can be used without changes."""
     scout = Scout()
     scans = scout.equipment.create_publisher(LaserScan, "/scan", qos_profile_sensor_data)
     scout.equipment.create_timer(0.1, lambda: scans.publish(LaserScan()))

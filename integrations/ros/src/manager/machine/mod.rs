@@ -41,7 +41,7 @@ struct Action {
 
 #[derive(Debug, Clone, Default)]
 struct CallFailures {
-    /// Failed designs, with the time of the next attempt. `None` while the function does not reply.
+    /// Failed designs, with the time of the next attempt. `None` if the attempt waits until the function replies.
     designs: BTreeMap<String, Option<Duration>>,
     /// Number of consecutive calls without a reply.
     missed_replies: u32,

@@ -73,9 +73,9 @@ impl Machine {
         self.action = Some(Action { number, call, effect, begun, is_lost: true, is_stopped: false });
     }
 
-    /// Performs the begun action of the previous run again, unless a line that was queued in the meantime has ended it,
-    /// because the performer may have lost it. For an action that ends with a message on a topic, this has no
-    /// disadvantage. A cancelled or suspended action counts as cancelled: no performer can report its end any more.
+    /// Performs the begun action of the previous run again, because its performer may have lost it, unless a queued
+    /// line has ended the action. For an action that ends with a message on a topic, this has no disadvantage. A
+    /// cancelled or suspended action counts as cancelled: no performer can report its end any more.
     pub(super) fn repeat_action(&mut self) {
         let beliefs = self.control.beliefs();
         let running = beliefs.running().map(|(number, _)| number);

@@ -52,7 +52,6 @@ impl Robot {
         robot
     }
 
-    /// Creates a machine that waits for its functions.
     fn waiting(mut control: Loop, settings: Settings, journal: Option<&Path>) -> Self {
         let journal =
             journal.map(|path| Journal::open(path, Policy::default(), &mut control).expect("a journal").0);
@@ -85,7 +84,6 @@ impl Robot {
         self.handle(Input::Changed(change.clone(), outcome))
     }
 
-    /// Answers all changes with success, including those that follow from them.
     fn obey(&mut self, outputs: Vec<Output>) -> Vec<Output> {
         let mut open = outputs;
         while let Some(at) = open.iter().position(|output| matches!(output, Output::Change(_))) {
@@ -388,7 +386,6 @@ fn a_restart_repeats_no_fulfilled_request() {
     assert!(text.contains("IDLE -> PLAN -> RECONFIGURE: the task search_pipeline is requested"), "{text}");
 }
 
-/// Mode of a function while the pipeline is searched.
 fn searching(function: &str) -> &'static str {
     match function {
         PATH => "fd_spiral_high",
