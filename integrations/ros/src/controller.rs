@@ -174,10 +174,13 @@ impl Controller {
             let (domain, problem) = (Source::new(DOMAIN, domain), Source::new(PROBLEM, problem));
             let _ = sender.try_send(solve(Request { domain, problem, joint: Some(&mission) }, &manner));
         };
-        on_a_thread("plan", work)
-            .map_err(|error| NoPlan::None(format!("no thread can be started: {error}")))?;
-        let outcome =
-            receiver.recv().await.unwrap_or_else(|_| Err(NoPlan::Fault("the planner has ended".to_owned())));
+        let outcome = match on_a_thread("plan", work) {
+            Ok(_) => {
+                let ended = |_| Err(NoPlan::Fault("the planner has ended".to_owned()));
+                receiver.recv().await.unwrap_or_else(ended)
+            }
+            Err(error) => Err(NoPlan::None(format!("no thread can be started: {error}"))),
+        };
         self.plan_publisher.publish_result(&outcome);
         outcome
     }

@@ -203,8 +203,9 @@ impl Driver {
         };
         self.node.log(Severity::Info, &text);
         self.handle(Input::Ready(modes))?;
+        // The calls above take seconds. What has arrived meanwhile must not be handled before the older inputs.
+        delayed.extend(inputs.try_iter());
         for input in delayed {
-            // The inputs that arrived during the wait are handled later, by `drive`.
             let _ = sender.send(input);
         }
         Ok(())
