@@ -25,7 +25,8 @@ pub struct VerdictAnswer<'a> {
     /// In the domain's time unit.
     #[schemars(with = "f64")]
     total_time: Value,
-    /// Final value of each numeric function with its arguments.
+    /// Value of each numeric function that actions can change, with its arguments, after the last executed step.
+    /// Functions without a value are omitted.
     #[schemars(with = "std::collections::BTreeMap<String, Option<f64>>")]
     values: Map<String, Value>,
     /// First violation; null for a valid plan.

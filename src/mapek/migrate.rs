@@ -86,7 +86,7 @@ impl Loop {
 }
 
 /// Merges initial states: elements in which `robot` differs from `former` replace those of `new`. An element
-/// of `former` that `robot` lacks is left out. Timed elements are those of `new`.
+/// of `former` that `robot` lacks is omitted. Timed elements are those of `new`.
 fn merged(
     former: &[InitialElement],
     robot: &[InitialElement],
