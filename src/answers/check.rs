@@ -36,7 +36,8 @@ pub struct ChecksAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = CHECKS))]
     format: &'static str,
-    /// One answer for each property and each combination of values of the constants.
+    /// One answer for each property and each combination of values of the constants, except those in
+    /// `refused`.
     answers: Vec<CheckAnswer<'a>>,
     /// Properties without an answer.
     refused: Vec<RefusedPart<'a>>,
