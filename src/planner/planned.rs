@@ -145,8 +145,7 @@ impl Planned<'_> {
     /// Writes a certificate of the status and the plan to a new directory. `metaplan verify` checks
     /// it.
     ///
-    /// # Errors
-    /// The answer has no certificate, actions overlap, or the directory cannot be written.
+    /// # Errors Actions overlap, or errors of [`certificate::write`].
     pub fn certify(&self, directory: &Path) -> Result<(), Message> {
         let task = match &self.task {
             Ground::Integers(task) => certificate::Ground::Integers(task),
