@@ -99,8 +99,7 @@ impl Comparison {
 /// a new plan. `report` is called after the first plan, after the exploration of the process, and after each
 /// candidate.
 ///
-/// # Errors
-/// Errors of the planner, or too many states.
+/// # Errors Errors of the planner, or the process has too many states or cannot be solved.
 pub fn compare(
     mission: &Coadaptation,
     config: &Config<'_>,
