@@ -99,7 +99,8 @@ impl Comparison {
 /// a new plan. `report` is called after the first plan, after the exploration of the process, and after each
 /// candidate.
 ///
-/// # Errors Errors of the planner, or the process has too many states or cannot be solved.
+/// # Errors
+/// Errors of the planner, or the process has too many states or cannot be solved.
 pub fn compare(
     mission: &Coadaptation,
     config: &Config<'_>,

@@ -172,7 +172,8 @@ impl Journal {
     /// Restores a loop that has not begun, as [`Journal::open`] does, but without changing files
     /// and without a lock.
     ///
-    /// # Errors The journal cannot be read or resumed, for example because it is damaged or belongs to another mission.
+    /// # Errors
+    /// The journal cannot be read or resumed, for example because it is damaged or belongs to another mission.
     pub fn rehearse<C: Recoverable>(directory: &Path, control: &mut C) -> Result<Recovery, Message> {
         let contents =
             JournalFiles::read(directory).map_err(|error| broken(directory, &error.to_string()))?;

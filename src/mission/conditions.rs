@@ -19,7 +19,8 @@ pub struct Fault {
 /// Parses a condition, such as `(robot_at dock)` or `(< (battery) 20)`. The parentheses of a single
 /// atom are optional.
 ///
-/// # Errors All syntax and type errors of the text.
+/// # Errors
+/// All syntax and type errors of the text.
 pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>> {
     let is_bare = !text.trim_start().starts_with('(');
     let open = if is_bare { "(" } else { "" };
@@ -44,7 +45,8 @@ pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>>
 /// Parses a numeric function with its arguments, such as `(battery)`. The outer parentheses are
 /// optional.
 ///
-/// # Errors The text has syntax or type errors, or is not a single function.
+/// # Errors
+/// The text has syntax or type errors, or is not a single function.
 pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     let mut problem = mission.problem().clone();
     mission.fill(&mut problem);

@@ -145,7 +145,8 @@ impl Planned<'_> {
     /// Writes a certificate of the status and the plan to a new directory. `metaplan verify` checks
     /// it.
     ///
-    /// # Errors Actions overlap, or errors of [`certificate::write`].
+    /// # Errors
+    /// Actions overlap, or errors of [`certificate::write()`].
     pub fn certify(&self, directory: &Path) -> Result<(), Message> {
         let task = match &self.task {
             Ground::Integers(task) => certificate::Ground::Integers(task),
