@@ -36,7 +36,8 @@ pub struct ChecksAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = CHECKS))]
     format: &'static str,
-    /// One answer for each property and each combination of values of the constants.
+    /// One answer for each property and each combination of values of the constants, except those in
+    /// `refused`.
     answers: Vec<CheckAnswer<'a>>,
     /// Properties without an answer.
     refused: Vec<RefusedPart<'a>>,
@@ -109,7 +110,7 @@ struct ValuePart {
 struct StatePart {
     /// Values of the variables.
     state: BTreeMap<String, i64>,
-    /// Whether the property holds in the state; null if this is not decided.
+    /// Whether the property holds in the state; absent if its values are numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     holds: Option<bool>,
     #[serde(flatten)]
@@ -127,7 +128,7 @@ struct ProvedPart {
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct SizePart {
-    /// Number of reachable states.
+    /// Number of explored states: all reachable states, or fewer if they decide the property.
     states: usize,
     /// Number of choices in all states.
     choices: usize,

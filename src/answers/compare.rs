@@ -208,11 +208,12 @@ struct CostsPart {
     decisions: usize,
     /// Running times of the stages.
     milliseconds: Milliseconds,
-    /// Peak memory in MB; null if the system does not report it.
+    /// The greater of the following two values; null if the system does not report the memory.
     peak_memory_mb: Option<u64>,
-    /// Peak memory until the process was solved, including memory that the planner has not released.
+    /// Peak memory in MB while the process was explored and solved, after the first plan. Includes memory that
+    /// the planner has not released.
     process_memory_mb: Option<u64>,
-    /// Peak memory of the first plan.
+    /// Peak memory in MB during the first plan.
     first_plan_memory_mb: Option<u64>,
 }
 

@@ -43,7 +43,7 @@ struct ChoicePart<'a> {
     need: &'a [String],
     /// Previous design, or null.
     before: Option<&'a str>,
-    /// Chosen design; null if no design is possible.
+    /// Chosen design; null if no design was chosen.
     design: Option<&'a str>,
     /// All designs of the function, in the order of preference.
     considered: Vec<ConsideredPart<'a>>,

@@ -47,7 +47,8 @@ pub struct DesignAnswer<'a> {
     functions: &'a [String],
     /// Whether the design is available.
     available: bool,
-    /// Rules and facts that rule the design out.
+    /// Rules and facts that rule the design out, and reasons why some actions could not use it even if it
+    /// were available.
     because: &'a [String],
     /// Steps of the best plan that use the design, from 1.
     used: &'a [usize],

@@ -177,7 +177,8 @@ struct StatisticsPart {
     evaluated: u64,
     /// Number of restarts of the satisficing search for a better plan.
     restarts: usize,
-    /// Improved plans, and lower bounds that rose by more than one percent, in order.
+    /// Improved plans, and lower bounds that rose by more than one percent or to the cost of the plan, in
+    /// order.
     history: Vec<MomentPart>,
     /// Running times of the stages.
     milliseconds: MillisecondsPart,

@@ -27,13 +27,13 @@ pub(super) struct RecoveryPart {
     resumed: bool,
     /// Number of lines in the journal.
     lines: u64,
-    /// Greatest sequence number of a line, or null if no line had a number.
+    /// Greatest sequence number of an accepted line, or null if no such line had a number.
     seq: Option<u64>,
     /// Ranges of skipped numbers below `seq`, with both ends.
     missing: Vec<[u64; 2]>,
     /// Number of bytes of an incomplete record that were cut off.
     cut_bytes: u64,
-    /// Faults of the journal that did not affect the recovery.
+    /// Warnings about files that were not needed, and about missing last records.
     warnings: Vec<String>,
 }
 

@@ -41,12 +41,12 @@ struct StrategyPart {
     runs: usize,
     /// Number of runs that reached the goal.
     accomplished: usize,
-    /// Metric of accomplished runs; null if there are none.
+    /// Cost of accomplished runs (see `runs`); null without such runs.
     cost: Option<SamplePart>,
-    /// Reaction time: from an event that prevents the current action from continuing to the reaction;
-    /// null without such an event.
+    /// Reaction time: from an event that prevents the current action from continuing to the reaction; null
+    /// without a reaction.
     reaction: Option<SamplePart>,
-    /// Number of changes of a function's design.
+    /// Number of requested changes of a function's design, except those of an unknown design.
     reconfigurations: Option<SamplePart>,
     /// Number of different configurations of requested actions.
     configurations: Option<SamplePart>,
@@ -62,9 +62,10 @@ struct StrategyPart {
 struct SamplePart {
     /// Mean.
     mean: f64,
-    /// Standard deviation of the sample.
+    /// Standard deviation of the sample; 0 for a single value.
     deviation: f64,
-    /// Half-width of the 95 % confidence interval by Student's distribution.
+    /// Half-width of the 95 % confidence interval of the mean, by Student's distribution. 0 for a single
+    /// value, which has no such interval.
     half_width_95: f64,
 }
 
@@ -83,7 +84,7 @@ struct RunPart {
     out_of_time: bool,
     /// Whether the strategy gave up.
     gave_up: bool,
-    /// Metric at the end of the run.
+    /// Metric at the end of the run, or its duration if the metric is missing or undefined.
     cost: f64,
     /// Duration of the run.
     time: f64,
@@ -95,11 +96,11 @@ struct RunPart {
     cancelled: usize,
     /// Number of planning queries.
     plans: usize,
-    /// Number of changes of a function's design.
+    /// Number of requested changes of a function's design, except those of an unknown design.
     reconfigurations: usize,
     /// Number of different configurations of requested actions.
     configurations: usize,
-    /// Mean reaction time; null without an event.
+    /// Mean reaction time; null without a reaction.
     reaction: Option<f64>,
     /// Time at which the pipeline was found; null if it was not found or the mission has none.
     found: Option<f64>,

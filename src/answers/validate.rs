@@ -16,7 +16,7 @@ pub struct VerdictAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = FORMAT))]
     format: &'static str,
-    /// Whether the plan is executable and reaches the goal.
+    /// Whether the plan is executable, reaches the goal, and satisfies all mandatory constraints.
     valid: bool,
     /// Value of the metric after a valid plan; null without `:metric`, or if it is undefined.
     #[schemars(with = "Option<f64>")]
@@ -25,7 +25,8 @@ pub struct VerdictAnswer<'a> {
     /// In the domain's time unit.
     #[schemars(with = "f64")]
     total_time: Value,
-    /// Final value of each numeric function with its arguments.
+    /// Value of each numeric function that actions can change, with its arguments, after the last executed step.
+    /// Functions without a value are omitted.
     #[schemars(with = "std::collections::BTreeMap<String, Option<f64>>")]
     values: Map<String, Value>,
     /// First violation; null for a valid plan.
@@ -34,9 +35,9 @@ pub struct VerdictAnswer<'a> {
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ViolationPart<'a> {
-    /// Number of the step, from 1; null for the goal.
+    /// Number of the step, from 1; null for the goal and for constraints.
     step: Option<usize>,
-    /// Action of the step; null for the goal.
+    /// Action of the step; null for the goal and for constraints.
     action: Option<&'a str>,
     /// Time of the violation, in the domain's time unit.
     #[schemars(with = "f64")]

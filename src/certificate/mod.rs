@@ -1,5 +1,6 @@
-//! Writes certificates: directories with a proof that a plan is optimal, or that no plan exists.
-//! `metaplan-verify` checks them. The documentation of the crate `verify` specifies the files.
+//! Writes certificates: directories with a proof that a plan is optimal, that no plan exists, or
+//! that a Pareto front is complete. `metaplan-verify` checks them. The documentation of the crate
+//! `verify` specifies the files.
 
 mod derivations;
 mod front;

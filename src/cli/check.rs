@@ -40,7 +40,7 @@ pub struct Arguments {
     /// `first:step:last` yields a table.
     #[arg(long = "const", value_name = "NAME=VALUE", value_delimiter = ',', value_parser = setting)]
     constants: Vec<(String, String)>,
-    /// Also write the table of a series to a CSV file.
+    /// Also write the values to a CSV file.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Write an optimal policy to a file.

@@ -45,8 +45,8 @@ pub struct Arguments {
 /// components), and which designs are preferred.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Wanted {
-    /// A required function (repeatable). Default: the objectives of the knowledge base, or all its
-    /// functions if it has none.
+    /// A required function, in addition to the objectives of the knowledge base (repeatable). Default: all
+    /// functions if the knowledge base has no objectives.
     #[arg(long = "objective", value_name = "FUNCTION")]
     objectives: Vec<String>,
     /// Prefer designs for FUNCTION whose estimation of ATTRIBUTE satisfies a bound (repeatable). The rules of the
@@ -54,7 +54,7 @@ pub(super) struct Wanted {
     /// knowledge base has objectives, this requires `--objective FUNCTION`.
     #[arg(long = "require", value_name = "FUNCTION.ATTRIBUTE=BOUND", value_parser = requirement)]
     requirements: Vec<(String, String, BigRational)>,
-    /// Upper limit on the sum of an attribute's estimations over all chosen designs (repeatable).
+    /// Upper limit on the sum of an attribute's estimations over all designs in use (repeatable).
     #[arg(long = "budget", value_name = "ATTRIBUTE=MOST", value_parser = amount)]
     budgets: Vec<(String, BigRational)>,
     /// Component that only one design can use at a time (repeatable).

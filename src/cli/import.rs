@@ -20,8 +20,8 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Form {
-    /// Import a map of Cámara et al. (`map-p2cp3.json` and maps in this format, also of 2017) as a
-    /// mission with probabilities.
+    /// Import a map of Cámara et al. as a mission: `map-p2cp3.json`, another map in this format, or a map of
+    /// 2017. Moves can fail or collide with the probabilities in the map; maps of 2017 have none.
     CamaraMap(CamaraMap),
 }
 

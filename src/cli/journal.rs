@@ -26,7 +26,7 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Operation {
-    /// Check whether the journal can be used, and report all defects.
+    /// Check whether the journal can be used, and report its defects.
     Check {
         /// The journal's directory.
         #[arg(value_name = "DIR")]
@@ -35,7 +35,7 @@ enum Operation {
         #[arg(long, value_name = "MISSION")]
         mission: Option<PathBuf>,
     },
-    /// Show all intact records: events and decisions.
+    /// Show all intact records, such as events and decisions.
     Show {
         /// The journal's directory.
         #[arg(value_name = "DIR")]

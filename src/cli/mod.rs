@@ -93,7 +93,7 @@ enum Subcommands {
     /// Explain why a design is available or chosen, which changes lead to another plan, or a message code.
     #[command(after_long_help = examples::EXPLAIN)]
     Explain(explain::Arguments),
-    /// Export a mission for other planners, with the facts from the knowledge base.
+    /// Export a mission for other planners and model checkers, with the facts from the knowledge base.
     #[command(after_long_help = examples::EXPORT)]
     Export(export::Arguments),
     /// Write a plan or a journal as an HTML page: timeline, map, search, reasons for designs, effects of
@@ -118,7 +118,7 @@ enum Subcommands {
     /// Verify a certificate without trusting the planner.
     #[command(after_long_help = examples::VERIFY)]
     Verify(verify::Arguments),
-    /// Print the JSON Schema of an output format or of manifests.
+    /// Print the JSON Schema of an input or output format.
     Schema(schema::Arguments),
     /// Print a script that completes commands and options in a shell.
     Completions(completions::Arguments),

@@ -56,8 +56,8 @@ pub struct Arguments {
     /// or raise the lower bound until a plan has this cost. It does not change the cost of the answer.
     #[arg(long, value_enum, default_value_t, conflicts_with = "concurrent")]
     strategy: StrategyName,
-    /// Number of actions per step of the SAT formulas. Default: several until there is a first plan,
-    /// then one. It does not change the cost of the answer.
+    /// Number of actions per step of the SAT formulas. Default: several until there is a first plan, then one. With
+    /// `--horizon`, always one. It does not change the cost of the answer.
     #[arg(long, value_enum, conflicts_with = "concurrent")]
     encoding: Option<Encoding>,
     /// Minimise an expression or a function instead of the problem's metric. If the option is repeated,

@@ -45,8 +45,8 @@ pub(super) enum Flow {
 pub(super) struct Resumed<A> {
     pub(super) journal: Journal,
     pub(super) recovery: Recovery,
-    /// Answers of the reaction to an event without a recorded reaction, and effects that were not acknowledged. Empty
-    /// before this reaction.
+    /// Answers of the reaction to an event without a recorded reaction, and effects that still await an
+    /// acknowledgement. Empty before this reaction.
     pub(super) answers: Vec<A>,
 }
 

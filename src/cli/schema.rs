@@ -10,8 +10,8 @@ use crate::cli::output;
 /// Arguments of `schema`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// `manifest`, `event`, `answer`, or the `format` of an answer without `metaplan-` and version, for
-    /// example `plan`, `lint` or `verdict`. Without it, all formats are listed.
+    /// `manifest`, `study`, `event`, `answer`, or the `format` of an answer without `metaplan-` and version,
+    /// for example `plan`, `lint` or `verdict`. Without it, all formats are listed.
     #[arg(value_name = "FORMAT")]
     name: Option<String>,
 }

@@ -100,7 +100,7 @@ impl Comparison {
 /// candidate.
 ///
 /// # Errors
-/// Errors of the planner, or too many states.
+/// Errors of the planner, or the process has too many states or cannot be solved.
 pub fn compare(
     mission: &Coadaptation,
     config: &Config<'_>,

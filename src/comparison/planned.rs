@@ -64,8 +64,8 @@ pub struct Costs {
     pub decisions: usize,
     /// Running times of model checking, for all objectives together.
     pub process: Stages,
-    /// Peak memory in megabytes until the process was solved, including memory that the planner has not released.
-    /// `None` if the platform does not report it.
+    /// Peak memory in megabytes while the process was explored and solved, after the first plan. Includes memory
+    /// that the planner has not released. `None` if the platform does not report it.
     pub process_memory: Option<u64>,
     /// Number of computed plans.
     pub plans: usize,

@@ -305,7 +305,8 @@ impl Whole<'_> {
             return Verdict::Less;
         }
         let conflict = self.conflict(at, offer, &[]);
-        // Without a conflict, the best choice would have this design.
+        // A preferred design that conflicts with no other design would be part of the best choice. So if there is no
+        // conflict, the search ended at a limit before it found the best choice.
         let limit = || "a limit was reached before a choice with this design was found".to_owned();
         Verdict::Together(conflict.unwrap_or_else(limit))
     }

@@ -79,11 +79,10 @@ impl PartialEq for Cause {
 /// The causes found that rule a design out.
 #[derive(Debug, Clone)]
 pub struct Causes {
-    /// The causes. Empty if the design is available, or if neither a component nor a measurement is
-    /// a cause.
+    /// The causes. Empty if the design is available, or if no cause was found.
     pub causes: Vec<Cause>,
-    /// `true` if exactly one minimal set of alterations was found, so each found cause has to be
-    /// removed. `false` if removing some of them can suffice, or if no set was found.
+    /// `true` if exactly one minimal set of alterations was found. Unless another set was missed, each cause then has
+    /// to be removed.
     pub are_all_needed: bool,
 }
 

@@ -173,8 +173,7 @@ impl Journal {
     /// and without a lock.
     ///
     /// # Errors
-    /// The journal cannot be resumed: it is damaged, or belongs to another mission, or the mission
-    /// leads to other decisions.
+    /// The journal cannot be read or resumed, for example because it is damaged or belongs to another mission.
     pub fn rehearse<C: Recoverable>(directory: &Path, control: &mut C) -> Result<Recovery, Message> {
         let contents =
             JournalFiles::read(directory).map_err(|error| broken(directory, &error.to_string()))?;
@@ -184,8 +183,8 @@ impl Journal {
     }
 
     /// Completes the work that the previous process left unfinished, or makes the first decision in a new journal. Both
-    /// may require planning. Returns the answers that may not have left the program: first the answers to the
-    /// unfinished work, then effects that were not acknowledged.
+    /// may require planning. Returns the answers to the unfinished work, then the effects that still await an
+    /// acknowledgement. These may not have left the program before.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -223,8 +222,8 @@ impl Journal {
         self.again(control, answers)
     }
 
-    /// Flushes the journal. Returns `answers`, followed by all earlier effects that were not acknowledged, which have
-    /// to be output again. If a write has failed and the loop continues, a message about this comes first.
+    /// Flushes the journal. Returns `answers`, followed by all earlier effects that still await an acknowledgement,
+    /// which have to be output again. If a write has failed and the loop continues, a message about this comes first.
     fn again<C: Recoverable>(
         &mut self,
         control: &C,
@@ -471,8 +470,7 @@ fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> 
     Ok((file, link))
 }
 
-/// Writes a snapshot atomically. An existing file of this name is a damaged snapshot, and is kept as
-/// `snapshot-N.damaged`.
+/// Writes a snapshot atomically. An existing file of this name is unusable, and is kept as `snapshot-N.damaged`.
 fn write_snapshot(directory: &Path, number: u64, line: &str) -> io::Result<()> {
     let name = path(directory, "snapshot", number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;

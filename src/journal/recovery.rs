@@ -7,7 +7,7 @@ use crate::message::Message;
 pub struct Recovery {
     /// Number of observations since the restored snapshot, or since the beginning. `None` for a new journal.
     pub replayed: Option<u64>,
-    /// Number of bytes of an incomplete last record that were cut off.
+    /// Number of bytes of incomplete records that were cut off.
     pub cut: u64,
     /// Faults in files that were not needed, and a message if the last records of the journal are missing.
     pub warnings: Vec<Message>,

@@ -1,11 +1,11 @@
 //! Determines the believed design of each function from acknowledgements and failures of reconfigurations.
 //!
 //! The event `acknowledged` refers to an effect by its number. After the acknowledgement of a reconfiguration, its
-//! function is believed to have the requested design, until another design is observed or a failure is reported. If
-//! another design was observed while the reconfiguration was pending, the design is unknown. Messages can cross, be
-//! duplicated or arrive out of order: of two acknowledged reconfigurations of one function, the one requested later
-//! counts. A reconfiguration that a later one has superseded can still be acknowledged; until then its design is not
-//! believed.
+//! function is believed to have the requested design. Later observations, failures and acknowledgements can correct
+//! this belief. If another design was observed while the reconfiguration was pending, the design is unknown. Messages
+//! can cross, be duplicated or arrive out of order: of two acknowledged reconfigurations of one function, the one
+//! requested later counts. A reconfiguration that a later one has superseded can still be acknowledged; until then its
+//! design is not believed.
 //!
 //! A report that an action has started, progressed or succeeded implies that the request of the action has arrived.
 //! Some robots never acknowledge an effect by its number. For such a robot, the report also implies that the
@@ -26,7 +26,7 @@ pub(super) enum Receipt {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
     Design(String),
-    /// No consequence: the report is old or a duplicate.
+    /// The report is old or a duplicate: the believed designs stay as they are.
     Stale,
     NotReconfiguration,
 }

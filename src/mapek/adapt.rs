@@ -1,11 +1,12 @@
 //! Decides after changes whether a new plan is needed, has it computed, and adopts it (Algorithm 1 of the paper, see
 //! [`crate::mapek`]).
 //!
-//! The paper plans whenever the available designs have changed or an objective is in error. Here, a plan that is still
-//! valid and uses none of the lost designs is kept. If such a plan was optimal, it still is, because losing
-//! alternatives cannot improve the optimum. If the action under way loses a design, the designs of this action and of
-//! the remaining steps are chosen again together, see [`crate::mapek::resume`]. If no plan continues the action, or
-//! another plan is better, the action is suspended or cancelled, see [`crate::mapek::interrupt`].
+//! The paper plans whenever the available designs have changed or an objective is in error. Here, the loss of designs
+//! alone is no reason to drop a plan that is still valid and uses none of them. If such a plan was optimal, it still
+//! is, because losing alternatives cannot improve the optimum. If the action under way loses a design, the designs of
+//! this action and of the remaining steps are chosen again together, see [`crate::mapek::resume`]. If no plan
+//! continues the action, or another plan is better, the action is suspended or cancelled, see
+//! [`crate::mapek::interrupt`].
 
 use std::time::Duration;
 
@@ -34,7 +35,7 @@ const MIN_RETRY: Duration = Duration::from_secs(10);
 
 const MAX_RETRY: Duration = Duration::from_secs(3600);
 
-/// Entry of `Beliefs::improvement_causes`, among the names of designs, that represents changed facts.
+/// Entry of `Beliefs::improvement_causes`, among the names of designs, that represents all other changes.
 const FACTS: &str = "facts";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,8 +154,9 @@ impl Adaptation<'_> {
         }
     }
 
-    /// Ends a suspension of the action under way that was requested only until planning has finished. Resumes the
-    /// action if it is not being cancelled, its designs are available, and its remainder is executable.
+    /// Decides about an action under way that was suspended only until planning has finished. Resumes the action if it
+    /// is not being cancelled, its designs are available, and its remainder is executable. Otherwise, it stays
+    /// suspended.
     pub(super) fn release(&mut self, answers: &mut Vec<Answer>) {
         let Some(mut running) =
             self.beliefs.running.clone().filter(|running_action| running_action.provisional)

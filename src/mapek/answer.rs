@@ -28,8 +28,8 @@ pub enum Answer {
         contradictions: Vec<Contradiction>,
     },
     /// The conclusions are incomplete because reasoning has exceeded its budget or was interrupted, or they are
-    /// complete again. Observed statements are kept. With incomplete conclusions, no design counts as available, and no
-    /// action is requested.
+    /// complete again. Observed statements are kept. With incomplete conclusions, no design of the knowledge base
+    /// counts as available, and no action is requested.
     Unconcluded {
         /// Fault that stopped the reasoning; `None` once the conclusions are complete.
         fault: Option<Fault>,
@@ -53,7 +53,7 @@ pub enum Answer {
         /// Reason, as a sentence.
         because: String,
     },
-    /// Planning has found no plan, or pauses because an action has failed repeatedly.
+    /// Planning has found no plan that can be executed, or pauses because an action has failed repeatedly.
     PlanNone {
         /// `unsolvable` if the absence of a plan is proved, `failed` if an action has failed repeatedly, and `unknown`
         /// otherwise.
@@ -73,7 +73,7 @@ pub enum Answer {
         effect: Option<u64>,
         /// Number of the action.
         action: u64,
-        /// Seconds since the last request of the effect, or since the request or last report of the action.
+        /// Seconds since the last request of the effect, or since the request, resumption or last report of the action.
         seconds: u64,
         /// Reaction of the loop.
         outcome: OverdueOutcome,
@@ -122,7 +122,7 @@ pub enum Answer {
         /// Description of the fault and its consequences.
         message: String,
     },
-    /// The line, or a part of it, was refused and has changed nothing; or the knowledge base could not be updated.
+    /// The line, or a part of it, was refused; or the knowledge base could not be updated.
     Error {
         /// Stable code of the error, such as `M305`.
         code: String,
@@ -365,7 +365,8 @@ impl Effect {
     fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         object.serialize_entry("answer", self.command.kind())?;
         if let Command::Request { step } = &self.command {
-            // In a request, `action` is the number; the name of the schema follows as `name`.
+            // As in the other effects, `action` is the number of the action. In a step of a plan,
+            // it is the name of the schema, which is therefore written as `name` here.
             object.serialize_entry("action", &self.action)?;
             step.fields(object)?;
             object.serialize_entry("name", &step.action)?;

@@ -1,8 +1,8 @@
 //! Shared state of the loop: the believed situation, the plan and outstanding effects. After a deliberation, this is
 //! the whole state of the loop, apart from caches.
 //!
-//! While an action is under way, numeric values that the action increases or decreases change with its progress. The
-//! other effects of the action take place when it succeeds.
+//! While an action is under way, numeric values that the action only increases or decreases change with its
+//! progress. The other effects of the action take place when it succeeds.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -42,7 +42,8 @@ pub struct Beliefs {
     pub(super) unproved: bool,
     pub(super) retry: Option<Retry>,
     pub(super) failures: Option<(PlannedStep, u32)>,
-    /// Names of designs that are available again, and an entry for changed facts. A better plan may then exist.
+    /// Names of designs that are available again, and one entry for all other changes after which a better
+    /// plan may exist or be found.
     pub(super) improvement_causes: BTreeSet<String>,
     /// Time at which the last entry of `improvement_causes` was added, since the start of the mission.
     pub(super) improvement_since: Duration,
@@ -74,7 +75,7 @@ pub(super) struct Running {
     /// Whether the action is suspended only until planning has finished.
     pub(super) provisional: bool,
     pub(super) request: u64,
-    /// Time of the request or of the last report, since the start of the mission.
+    /// Time of the request, resumption or last report, whichever was last, since the start of the mission.
     pub(super) last_report: Duration,
     /// Backoff factor: 0 after a report, 1 after the first missed deadline, then doubled by each further one.
     pub(super) overdue: u32,
@@ -97,7 +98,8 @@ pub(super) struct Retry {
     pub(super) attempt: u32,
 }
 
-/// Time of the last request of an outstanding effect, since the start of the mission, and number of its repetitions.
+/// Start of the wait for the acknowledgement of an effect, since the start of the mission, and number of repetitions of
+/// the effect because the wait was too long.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Wait {
     pub(super) since: Duration,
@@ -179,8 +181,9 @@ impl Beliefs {
         &self.configuration
     }
 
-    /// Returns the function and the requested design of each outstanding reconfiguration. A reconfiguration is not
-    /// outstanding after its acknowledgement, failure or deadline, or after a later one has superseded it.
+    /// Returns the function and the requested design of each outstanding reconfiguration. A reconfiguration is
+    /// outstanding until it is acknowledged, has failed, is abandoned, or is superseded, or until a report of an
+    /// action implies its arrival.
     pub fn pending(&self) -> impl Iterator<Item = (&str, &str)> {
         self.outstanding.values().filter_map(|effect| match &effect.command {
             Command::Reconfigure { function, to, .. } => Some((function.as_str(), to.as_str())),
@@ -188,8 +191,8 @@ impl Beliefs {
         })
     }
 
-    /// Returns `true` if a reconfiguration of the function is outstanding, or was superseded or given up without an
-    /// answer. The function's actual design may then differ from the believed one.
+    /// Returns `true` if a reconfiguration of the function is outstanding, or was superseded or abandoned and neither
+    /// it nor a later one was answered. The function's actual design may then differ from the believed one.
     pub fn is_unsettled(&self, function: &str) -> bool {
         self.pending().any(|(name, _)| name == function) || self.receipts.has_superseded(function)
     }
@@ -238,7 +241,7 @@ impl Beliefs {
         Some(Outlook { domain, problem, steps, first, is_under_way: running.is_some() })
     }
 
-    /// Unacknowledged effects in the order of their numbers.
+    /// Effects that still await an acknowledgement, in the order of their numbers.
     pub fn outstanding(&self) -> impl Iterator<Item = &Effect> {
         self.outstanding.values()
     }

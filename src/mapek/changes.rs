@@ -8,9 +8,10 @@ use crate::mapek::answer::Answer;
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {
     pub(super) base: Base,
-    /// Whether inputs of planning may have changed: facts or values of the problem, or facts of the knowledge base.
-    /// Also `true` after an action that ended without success. Effects of the progress and success of actions do not
-    /// count.
+    /// Whether inputs of planning may have changed, other than the goal, the availability of designs and statuses
+    /// (see `base`). Such inputs are facts and values of the problem, other facts of the knowledge base, and the
+    /// designs of the action under way. Also `true` after an action that ended without success. Effects of the
+    /// progress and success of actions do not count.
     pub(super) facts: bool,
     /// Whether a report has changed facts of the problem or a design of the action under way, and not only values.
     pub(super) predicates: bool,
@@ -34,7 +35,7 @@ pub(super) struct Changes {
 pub(super) enum Base {
     #[default]
     Nothing,
-    /// Statements or conclusions have changed, but none that determine availability or statuses.
+    /// Statements or conclusions may have changed, but none that determine availability or statuses.
     Stated,
     /// Statements that determine availability or statuses may have changed.
     Watched,

@@ -337,7 +337,7 @@ impl Loop {
         filters.into_iter().chain(improvement).chain(retry).chain(deadline).min()
     }
 
-    /// Returns unacknowledged effects as answers, to be requested again after a restart.
+    /// Returns the effects that still await an acknowledgement as answers, to be requested again after a restart.
     pub fn repeat(&self) -> Vec<Answer> {
         let again = |effect: &Effect| Answer::Effect(Effect { repeated: true, ..effect.clone() });
         self.beliefs.outstanding().map(again).collect()

@@ -18,7 +18,7 @@ pub trait Observer {
 
 /// Recipient of answers, which executes the effects among them.
 pub trait Effector {
-    /// Receives the answers to one observation, in order. Executes the effects among them.
+    /// Receives the answers to the start of the loop, or to one observation, in order. Executes the effects among them.
     ///
     /// # Errors
     /// The effects cannot be executed.

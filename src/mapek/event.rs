@@ -83,7 +83,7 @@ pub enum Event {
     Progress {
         /// Number of the action.
         action: u64,
-        /// Completed part, from 0 to 1, in hundredths.
+        /// Completed part, from 0 to 1. It is rounded to hundredths.
         #[serde(serialize_with = "as_number")]
         #[schemars(schema_with = "fraction_schema")]
         fraction: BigRational,

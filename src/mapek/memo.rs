@@ -91,7 +91,8 @@ impl StoredQuestion {
     }
 }
 
-/// Returns the parts of an action under way on which plans depend: not the numbers of the action and of its request.
+/// Returns the parts of an action under way on which plans depend, except `started`, which
+/// [`StoredQuestion::has_equal_start`] compares.
 fn relevant_part(running: &Running) -> (&PlannedStep, &BigRational, &BTreeMap<String, BigRational>) {
     (&running.step, &running.progress, &running.applied)
 }

@@ -1,5 +1,5 @@
-//! Migration: moves a robot to another version of its mission. What the robot has reported is kept, except for reports
-//! that the noise filters still hold back.
+//! Migration: moves a robot to another version of its mission. Changes that the robot has reported are kept, except
+//! those that the noise filters still hold back.
 //!
 //! Facts and values, also those of the knowledge base, are merged three ways: those that differ from the initial state
 //! of the former version are taken from the robot, all others from the new version. The plan is not transferred, because
@@ -46,7 +46,7 @@ impl Loop {
             let waiting = former.mission.knowledge().map(Knowledge::waiting);
             base.take_over(waiting.cloned().unwrap_or_default());
         }
-        // The filters start from the values and statuses that the robot has reported; held reports are lost.
+        // The filters start from the values and statuses of the knowledge base; held reports are lost.
         beliefs.filters = self.monitor.filters().states(beliefs.mission.knowledge());
         let init = merged(
             &initial.beliefs.mission.problem().init,
@@ -85,8 +85,8 @@ impl Loop {
     }
 }
 
-/// Merges initial states: elements in which `robot` differs from `former` replace those of `new`. An element of
-/// `former` that `robot` lacks is removed. Timed elements are those of `new`.
+/// Merges initial states: elements in which `robot` differs from `former` replace those of `new`. An element
+/// of `former` that `robot` lacks is omitted. Timed elements are those of `new`.
 fn merged(
     former: &[InitialElement],
     robot: &[InitialElement],
@@ -105,8 +105,9 @@ fn merged(
         };
         let name = record[0].to_string();
         match (former.get(&name), robot.remove(&name)) {
-            // The robot has another value than the former version. In the next arm, the fact is false for the robot.
+            // The robot's value differs from that of the former version, so it replaces the new one.
             (before, Some(now)) if before != Some(&now) => init.extend(element_from_record(&now)),
+            // The element is in the former version, but not in the state of the robot.
             (Some(_), None) => {}
             _ => init.push(element.clone()),
         }

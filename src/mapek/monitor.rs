@@ -163,8 +163,8 @@ impl BeliefUpdate<'_> {
     }
 
     /// Handles a report that a reconfiguration has failed: corrects the believed design of the function, and marks the
-    /// requested design as unrealisable until the next report about the design. An old or repeated report has no
-    /// effect.
+    /// requested design as unrealisable until the next report about the design. An old or repeated report changes
+    /// neither.
     fn failed_reconfiguration(&mut self, effect: u64) -> Result<(), Refusal> {
         if self.beliefs.mission.knowledge().is_none() {
             return Err(Refusal::new("M306", "without a knowledge base there are no designs"));

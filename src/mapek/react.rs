@@ -67,7 +67,7 @@ pub(super) fn trouble(beliefs: &Beliefs, running: &Running, facts: bool) -> Opti
 
 /// Returns the action under way with the available designs that make its remainder executable with the best metric.
 /// Ties are broken by the order of designs. Returns `None` if no designs make the remainder executable, or if the
-/// combinations of designs are too many to simulate.
+/// combinations of designs cannot be simulated (see [`first_steps`]).
 fn other_designs(beliefs: &Beliefs, running: &Running) -> Option<PlannedStep> {
     let problem = beliefs.filled();
     let question = Question {

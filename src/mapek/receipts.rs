@@ -18,10 +18,11 @@ pub(super) struct Receipts {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Received {
     pub(super) last: Option<Acknowledged>,
-    /// Superseded reconfigurations that the robot has not answered: maps the effect number to the requested design.
+    /// Superseded reconfigurations without an answer, after the last acknowledged one: maps the effect number to the
+    /// requested design.
     pub(super) superseded: BTreeMap<u64, String>,
-    /// Greatest effect number of an uncertain reconfiguration, or 0. After a report of an unexpected design, it is
-    /// unknown whether the robot carried out the reconfigurations up to this number before or after the report.
+    /// Reconfigurations up to this effect number are uncertain; 0 for none. After a report of an unexpected design,
+    /// it is unknown whether the robot carried out the reconfigurations up to this number before or after the report.
     pub(super) doubted: u64,
     /// Effect number of the last reconfiguration whose arrival was only implied by a report of an action. `None` once
     /// this or a later reconfiguration is acknowledged. Copies of the request may still arrive.
@@ -52,8 +53,8 @@ impl Receipts {
         self.by_number
     }
 
-    /// Returns `true` if a reconfiguration of the function was superseded before it was answered. The robot may still
-    /// carry out such a reconfiguration, even after an observation of the function.
+    /// Returns `true` if a reconfiguration of the function was superseded, and neither it nor a later one was
+    /// answered. The robot may still carry out such a reconfiguration, even after an observation of the function.
     pub(super) fn has_superseded(&self, function: &str) -> bool {
         self.functions.get(function).is_some_and(|history| !history.superseded.is_empty())
     }

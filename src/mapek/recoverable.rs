@@ -17,7 +17,8 @@ pub trait Recoverable {
     /// An answer of the loop.
     type Answer: From<Answer>;
 
-    /// Returns the checksum of the initial knowledge, mission and settings, which identifies the loop in a journal.
+    /// Returns the checksum of the initial knowledge, mission and settings and of the version of the program, which
+    /// identifies the loop in a journal.
     fn digest(&self) -> String;
 
     /// Returns the reaction to a journal that cannot be written.
@@ -49,7 +50,7 @@ pub trait Recoverable {
     /// called once after each reaction or deliberation.
     fn decision(&mut self, answers: &[Self::Answer]) -> Decision;
 
-    /// Returns the effects that were not acknowledged, for repetition after a restart.
+    /// Returns the effects that still await an acknowledgement, for repetition after a restart.
     fn repeat(&self) -> Vec<Self::Answer>;
 
     /// Returns the number of the effect that an answer requests, or `None` if the answer requests no effect.

@@ -220,7 +220,8 @@ fn state_changes(problem: &mut Problem, restored: &BTreeSet<Name>, applied: &BTr
     problem.init.extend(companions);
 }
 
-/// Returns `true` if the state of `problem` already has all changes of facts by the action.
+/// Returns `true` if the action changes facts, unconditionally, and the state of `problem` already has all these
+/// changes.
 pub(super) fn has_reached_facts(domain: &Domain, step: &PlannedStep, problem: &Problem) -> bool {
     schemas(domain, step).any(|schema| reached_facts(schema, step, problem).is_some())
 }
@@ -475,8 +476,8 @@ impl<'a> Shortening<'a> {
         }
     }
 
-    /// Subtracts the past changes from a value that a condition of the copy reads, as if they had been made with the
-    /// designs of the copy.
+    /// Makes a condition of the copy read a value without the progress of the action: subtracts the changes that the
+    /// progress would have made with the designs of the copy.
     fn restore_in_condition(&self, leaf: &mut Expression) {
         let Expression::Fluent(atom) = &*leaf else { return };
         let differences = self.differences.iter().filter(|(target, _)| is_same(target, atom));

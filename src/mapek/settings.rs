@@ -23,14 +23,14 @@ pub struct AdaptationSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     minimum_benefit: Option<Spanned<toml::Value>>,
-    /// Seconds for which a design must be available again before the loop searches for a better plan
-    /// (default 5). Always in seconds, independent of the domain's time unit.
+    /// Seconds after a design has become available again, or facts have changed, before the loop searches for a
+    /// better plan (default 5). Always in seconds, independent of the domain's time unit.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     settle: Option<Spanned<toml::Value>>,
-    /// Time limit for a plan in seconds (default 10). Then the best plan so far is used, if there is
-    /// one. Planning is repeated after a change, and also after a pause that doubles each time together
-    /// with the limit.
+    /// Time limit of a search for a plan in seconds (default 10). At the limit, the best plan found is used. A
+    /// search without a proved outcome is repeated after pauses that double up to an hour, with limits that double
+    /// up to 8 times this limit.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     time_limit: Option<Spanned<toml::Value>>,
@@ -38,11 +38,13 @@ pub struct AdaptationSection {
     /// Otherwise the choice depends only on the situation.
     #[serde(default)]
     stay_close: bool,
-    /// Seconds for which a component must report a failure before it takes effect (default 0: at once).
+    /// Seconds without a contrary report after which a reported failure of a component takes effect (default 0: at
+    /// once).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     confirm_time: Option<Spanned<toml::Value>>,
-    /// Seconds for which a failed component must report that it works before it counts as recovered (default 2).
+    /// Seconds without a report of a failure, counted from the first report that a failed component works, after
+    /// which it counts as recovered (default 2).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     heal_time: Option<Spanned<toml::Value>>,

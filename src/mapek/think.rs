@@ -82,7 +82,7 @@ impl ParallelSearch {
         self.running = Some(search);
     }
 
-    /// Returns `true` from the start of a search to [`Self::end`].
+    /// Returns `true` from the start of a search to [`Self::end`] or [`Self::interrupt`].
     pub fn is_running(&self) -> bool {
         self.running.is_some()
     }

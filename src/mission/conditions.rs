@@ -20,8 +20,7 @@ pub struct Fault {
 /// atom are optional.
 ///
 /// # Errors
-/// The text is malformed, or names a predicate, a function or an object that the mission does not
-/// have.
+/// All syntax and type errors of the text.
 pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>> {
     let is_bare = !text.trim_start().starts_with('(');
     let open = if is_bare { "(" } else { "" };
@@ -47,7 +46,7 @@ pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>>
 /// optional.
 ///
 /// # Errors
-/// The text is malformed, or names a function or an object that the mission does not have.
+/// The text has syntax or type errors, or is not a single function.
 pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     let mut problem = mission.problem().clone();
     mission.fill(&mut problem);

@@ -26,7 +26,7 @@ pub enum Unconfirmed {
 }
 
 impl Reading {
-    /// Semantics for sequential actions. `timed` is `true` if the domain has durations.
+    /// Semantics for sequential actions. `timed` is `true` if the cost of a plan without a metric is its total time.
     pub fn sequential(timed: bool) -> Self {
         Self { options: Options::default(), timed }
     }

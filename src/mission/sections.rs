@@ -68,8 +68,8 @@ pub struct PlanningSection {
     pub domain: PathBuf,
     /// The problem file.
     pub problem: PathBuf,
-    /// Time unit of the domain: `seconds`, `minutes` or `hours`. It converts the times of simulations
-    /// to the loop's clock in seconds.
+    /// Time unit of the domain: `seconds`, `minutes` or `hours`. It converts expected durations of actions,
+    /// and the times of simulations, to the loop's clock in seconds.
     #[serde(default)]
     pub time_unit: TimeUnit,
 }

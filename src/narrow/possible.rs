@@ -137,8 +137,8 @@ impl Possible {
         bounded.map(|(name, row)| (possible(&name), row))
     }
 
-    /// Replaces each atom of a bounded predicate in conditions and axioms by its conjunction with
-    /// the companion's atom, and adds the companion to each axiom of a bounded predicate.
+    /// Replaces each atom of a bounded predicate in conditions of actions and in axioms by its conjunction
+    /// with the companion's atom, and adds the companion to each axiom of a bounded predicate.
     pub fn restrict(&self, domain: &mut Domain) {
         let declared: Vec<Declaration> = domain
             .predicates

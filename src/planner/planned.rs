@@ -146,7 +146,7 @@ impl Planned<'_> {
     /// it.
     ///
     /// # Errors
-    /// The answer has no certificate, actions overlap, or the directory cannot be written.
+    /// Actions overlap, or errors of [`certificate::write()`].
     pub fn certify(&self, directory: &Path) -> Result<(), Message> {
         let task = match &self.task {
             Ground::Integers(task) => certificate::Ground::Integers(task),

@@ -62,8 +62,8 @@ impl Recorder {
         self.send(Entry::Answer { time: self.time(), text: text.to_owned() });
     }
 
-    /// Returns `true` if the writer thread has ended, usually after an error. [`Recorder::finish`]
-    /// returns the error.
+    /// Returns `true` if the writer thread has ended early, usually after an error. [`Recorder::finish`] returns the
+    /// error.
     pub fn has_failed(&self) -> bool {
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
         thread.as_ref().is_some_and(JoinHandle::is_finished)

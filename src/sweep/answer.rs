@@ -28,7 +28,8 @@ pub struct SweepAnswer {
     missing: Vec<usize>,
     /// Reason why a limit ended the command before all runs were complete (M130).
     messages: Vec<Message>,
-    /// With `--merge`: groups of rows that differ only in numbers and seeds.
+    /// With `--merge`: groups of rows with equal texts and equal values of all varied keys except
+    /// `repetitions`.
     groups: Vec<GroupPart>,
 }
 
@@ -38,7 +39,8 @@ struct GroupPart {
     common: Map<String, Value>,
     /// Number of rows.
     rows: usize,
-    /// Mean of each column.
+    /// Statistics of each column of numbers or truth values, except varied keys and the exit
+    /// status.
     means: Map<String, Value>,
 }
 

@@ -23,7 +23,7 @@ use num_rational::BigRational;
 use num_traits::ToPrimitive as _;
 use serde_json::{Value, json};
 
-/// Microseconds since the start of the mission.
+/// A time since the start of the mission, or a duration, in microseconds.
 pub(crate) type Micros = u64;
 
 /// Side of a bound on which a design can be used.

@@ -1,4 +1,5 @@
-//! Filter for the reports of one component: a failure or recovery must be reported for some time before it is believed.
+//! Filter for the reports of one component: a reported failure or recovery is believed only if no report contradicts it
+//! for some time.
 
 use ontology::tomasys::change::Status;
 use serde_json::{Value, json};

@@ -24,11 +24,13 @@ pub(crate) type MeasuredsSection = BTreeMap<String, MeasuredSection>;
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ComponentSection {
-    /// Seconds for which this component must report a failure before it takes effect. Default: `adaptation.confirm_time`.
+    /// Seconds without a contrary report after which a reported failure of this component takes effect. Default:
+    /// `adaptation.confirm_time`.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     confirm_time: Number,
-    /// Seconds for which this component must report that it works before it counts as recovered. Default: `adaptation.heal_time`.
+    /// Seconds without a report of a failure, counted from the first report that this component works, after which it
+    /// counts as recovered. Default: `adaptation.heal_time`.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     heal_time: Number,
@@ -38,8 +40,8 @@ pub struct ComponentSection {
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredSection {
-    /// Hysteresis: distance from a violated bound at which it counts as satisfied again, in the
-    /// attribute's unit (default 2 % of the bound; 0 for none).
+    /// Hysteresis: distance from a violated bound at which it counts as satisfied again, in the attribute's unit
+    /// (default: the share `adaptation.band` of the bound; 0 for none).
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     hysteresis: Number,

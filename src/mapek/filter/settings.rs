@@ -13,17 +13,17 @@ use crate::message::{Message, did_you_mean};
 /// % of the reading.
 const BAND: (i64, i64) = (1, 50);
 
-/// Default time for which a recovery must be reported. A driver that publishes diagnostics once a second sends two
-/// reports in this time.
+/// Default of [`FilterSettings::heal_time`]. A driver that publishes diagnostics once a second sends two reports in
+/// this time.
 const HEAL: Duration = Duration::from_secs(2);
 
 /// Settings of the filters for measurements and component reports.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct FilterSettings {
-    /// Time for which a failure of a component must be reported before it is believed. Default: 0.
+    /// Time without a contrary report after which a reported failure of a component is believed. Default: 0.
     pub confirm_time: Duration,
-    /// Time for which a recovery of a component must be reported before it is believed. Default: 2 s.
+    /// Time without a report of a failure after which a reported recovery of a component is believed. Default: 2 s.
     pub heal_time: Duration,
     /// Hysteresis as a share of the bound, for attributes without their own hysteresis. Default: 0.02.
     pub band: BigRational,
@@ -36,9 +36,9 @@ pub struct FilterSettings {
 /// Confirmation times of one component. Missing times default to the times in [`FilterSettings`].
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ComponentTimes {
-    /// Time for which a failure must be reported before it is believed.
+    /// Time without a contrary report after which a reported failure is believed.
     pub confirm_time: Option<Duration>,
-    /// Time for which a recovery must be reported before it is believed.
+    /// Time without a report of a failure after which a reported recovery is believed.
     pub heal_time: Option<Duration>,
 }
 
