@@ -7,6 +7,7 @@
 use std::borrow::Cow;
 
 use num_rational::BigRational;
+use pddl::ast::ActionBody;
 use pddl::validate::advance_each;
 use planner::{FirstStep, Limits, Progress, Query, ReplanOutcome, Replanner};
 
@@ -132,14 +133,18 @@ pub(super) fn first_steps(question: &Question<'_>) -> Option<Vec<(PlannedStep, F
     let (domain, problem) = resume(question.mission.domain(), problem, &running.remainder());
     let plan_steps: Vec<_> = steps.iter().map(PlannedStep::to_plan_step).collect();
     let (metric, advances) = advance_each(&domain, &problem, &plan_steps);
+    let is_timed = domain.actions.iter().any(|action| matches!(action.body, ActionBody::Durative { .. }));
     let before = if question.problem.metric.is_some() { metric? } else { BigRational::default() };
     let mut first = Vec::new();
     for (mut step, change) in steps.into_iter().zip(advances) {
         let Ok(mut change) = change else { continue };
         remove_internal_changes(&mut change);
-        // Without a metric, plans are measured by their number of steps.
-        let one_step = BigRational::from_integer(1.into());
-        let metric = if question.problem.metric.is_some() { change.metric.clone()? } else { one_step };
+        let metric = match question.problem.metric {
+            Some(_) => change.metric.clone()?,
+            // Without a metric, plans are measured by the sum of durations or by their number of steps.
+            None if is_timed => change.duration.clone(),
+            None => BigRational::from_integer(1.into()),
+        };
         step.duration.clone_from(&change.duration);
         step.cost = &metric - &before;
         let (configuration, arguments) = (step.configuration.clone(), step.arguments.clone());

@@ -18,7 +18,8 @@ pub struct FirstStep {
     pub arguments: Vec<String>,
     /// Effects of the step.
     pub change: Advance,
-    /// Metric of the mission if it ended after this step. Without a metric, the number of steps, i.e. 1.
+    /// Metric of the mission if it ended after this step. Without a metric, the duration of the
+    /// step or, without durative actions, 1.
     pub metric: BigRational,
 }
 
