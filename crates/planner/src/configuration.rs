@@ -6,13 +6,13 @@
 //! all requirements, and one requirement outweighs all utilities. A component that only one design can use is
 //! modelled as a budget of 1.
 //!
-//! The algorithm is dynamic programming over the functions with dominance pruning. A partial assignment is pruned
-//! in three cases: another one for these functions has at least its worth and consumes no more of any budget; a
-//! budget does not even suffice for the minimum consumption of the remaining functions; or an upper bound on its
-//! completions is less than the best known worth. The upper bound is a Lagrangian relaxation of the budgets, which
-//! is valid for any multipliers
-//! \[1\]. A subgradient method computes good multipliers in floating-point arithmetic \[2\]. The multipliers are
-//! then rounded, and the bound is evaluated exactly.
+//! The algorithm is dynamic programming over the functions with dominance pruning. A partial assignment is dominated
+//! if another one for these functions consumes no more of any budget and has a greater worth. At equal worth, the
+//! other one must also be preferred. A partial assignment is also pruned if a budget does not even suffice for the
+//! minimum consumption of the remaining functions. So is one with an upper bound on its completions that is less than
+//! the best known worth. This upper bound is a Lagrangian relaxation of the budgets, which is valid for any
+//! multipliers \[1\]. A subgradient method computes good multipliers in floating-point arithmetic \[2\]. The
+//! multipliers are then rounded, and the bound is evaluated exactly.
 //!
 //! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of
 //!   Resources, Operations Research 11(3), 1963.

@@ -183,7 +183,7 @@ fn changed_arguments_prove_nothing_that_is_false() {
 }
 
 /// Ambiguous tasks prove nothing: an operator that changes a number twice, a number with two coefficients in
-/// an expression, and a design that does not exist.
+/// an expression, and combinations of designs that do not exist.
 #[test]
 fn tasks_that_can_be_read_in_two_ways_are_refused() {
     let (mut twice, mut factors, mut designs) = (0, 0, 0);

@@ -416,8 +416,8 @@ fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
 
 const LAST: i128 = 4;
 
-/// Returns the best metric over all plans with up to three actions, whose starts and durations are multiples
-/// of the separation.
+/// Returns the best metric over all plans with up to three actions that start no later than [`LAST`]. Starts
+/// and durations are multiples of the separation.
 fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;

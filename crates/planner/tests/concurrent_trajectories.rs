@@ -201,8 +201,8 @@ fn sample(random: &mut Random) -> (String, String, [i128; 3]) {
 
 const LAST: i128 = 5;
 
-/// Minimum metric of plans with up to three actions that start at integer times: over all plans,
-/// and over the plans without simultaneous happenings.
+/// Minimum metric of plans with up to three actions that start at integer times up to [`LAST`]: over all
+/// plans, and over the plans without simultaneous happenings.
 fn brute_force(durations: [i128; 3], domain: &Domain, problem: &Problem) -> [Option<BigRational>; 2] {
     let mut best = [None, None];
     let mut open: Vec<Vec<(i128, usize)>> = vec![Vec::new()];

@@ -54,7 +54,7 @@ fn no_combination_of_many_designs_is_forgotten() {
       (:action sleep :parameters () :precondition () :effect (and (done) (increase (total-cost) 50))))";
     let value = |index| format!("(= (use d{index}) {})", if index == 399 { 1 } else { 100 });
     let problem = designs(400, value);
-    // Without the alternative action, there is no other plan.
+    // Without the action `sleep`, every plan uses `run`.
     let without = domain.split("(:action sleep").next().map(|text| format!("{text})")).unwrap_or_default();
     for domain in [domain, &without] {
         let solution = solve(domain, &problem);

@@ -276,7 +276,7 @@ fn conditions_on_sums_bound_the_costs_of_purchases() {
         :precondition (and (at ?p) (> (sale ?g ?p) 0) (<= (sale ?g ?p) (- (request ?g) (bought ?g))))
         :effect (and (assign (sale ?g ?p) 0) (increase (total-cost) (* (sale ?g ?p) (price ?g ?p)))
           (increase (bought ?g) (sale ?g ?p)))))";
-    // Two of m at 3 and one of m at 5, with ways of 4: 4 + 6 + 4 + 5 + 4. At n alone: 4 + 15 + 4.
+    // With a price of 5: two at m and one at n, ways of 4: 4 + 6 + 4 + 5 + 4. At n alone: 4 + 15 + 4.
     let problem = |price: u32| {
         format!(
             "(define (problem p) (:domain tpp) (:objects h m n - place g - goods)

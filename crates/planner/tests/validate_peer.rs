@@ -1,5 +1,5 @@
 //! Compares the validator with that of the Unified Planning Framework. Both must agree on cheapest plans of
-//! generated missions, and on plans that differ from them in one place.
+//! generated missions, and on plans that differ from them by one change.
 //!
 //! The environment variable `METAPLAN_PEERS` must name a Python with the framework (`python3 -m venv peers;
 //! peers/bin/pip install unified-planning`, then `METAPLAN_PEERS=peers/bin/python`). The missions are

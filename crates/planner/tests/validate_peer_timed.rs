@@ -1,6 +1,6 @@
 //! Compares the validator with that of the Unified Planning Framework on plans with times. The files are real
-//! files that the framework can read. The plans are cheapest plans and plans that differ from them in one
-//! place.
+//! files that the framework can read. The plans are cheapest plans and plans that differ from them by one
+//! change.
 //!
 //! The framework ignores the mutex rule of PDDL 2.1. If an action has no effect at its start, the framework
 //! also ignores its over-all condition directly after the start. The validator must reject every plan that

@@ -59,7 +59,8 @@ pub enum Error {
         /// Source location.
         place: Place,
     },
-    /// A product or quotient that is not linear in the numeric fluents that actions change.
+    /// A product, quotient or scaling effect that is not linear in the numeric fluents that actions change. Also a
+    /// scaling effect whose factor depends on the design of a slot.
     #[error("the expression is not linear in the fluents that actions change")]
     NonLinear {
         /// Source location.

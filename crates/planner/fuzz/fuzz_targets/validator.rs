@@ -1,5 +1,5 @@
-//! Fuzz target: generates tasks and plans. The validator must agree with a naive interpreter, also on
-//! concurrent plans whose steps do not overlap. Arbitrary plan text must be validated or rejected.
+//! Fuzz target: generates tasks and plans. The validator must agree with a naive interpreter on sequential
+//! plans. Arbitrary plan text must be validated or rejected.
 
 #![no_main]
 

@@ -8,9 +8,8 @@ use task::task::{Argument, Task};
 
 /// Cheapest plans other than the first plan, and the choices that all cheapest plans share.
 ///
-/// Idle actions are ignored: they cost nothing, and neither the goal, the metric nor a non-idle action
-/// depends on their effects. Grounding removes idle actions. Removing them from a plan yields a plan of equal
-/// cost.
+/// Idle actions are ignored: grounding removes them, because nothing depends on their effects and they cannot improve
+/// the metric. Removing them from a cheapest plan yields a cheapest plan.
 #[derive(Debug, Clone)]
 pub struct Alternatives {
     /// Cheapest plans other than the first plan, at most the requested number.
@@ -27,10 +26,10 @@ pub struct Alternatives {
 /// Choices at one step that every cheapest plan makes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Forced {
-    /// `true` if every cheapest plan has the same action with the same arguments at this step. Designs among the
-    /// arguments are ignored if grounding leaves them open (slots).
+    /// `true` if it is proved that every cheapest plan has the same action with the same arguments at this step.
+    /// Designs among the arguments are ignored if grounding leaves them open (slots).
     pub action: bool,
-    /// Names of the functions for which every cheapest plan selects the same design at this step.
+    /// Names of the functions for which it is proved that every cheapest plan selects the same design at this step.
     pub functions: Vec<String>,
 }
 

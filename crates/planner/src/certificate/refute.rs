@@ -38,7 +38,8 @@ pub struct Outputs<'o> {
 ///
 /// # Errors
 /// The documents are invalid, the formula does not support a construct of the task, there is no step bound, the
-/// formula is satisfiable, a limit is reached, or an output cannot be written or read again.
+/// formula is satisfiable, the solver's refutation is invalid, a limit is reached, or an output cannot be written or
+/// read again.
 #[expect(clippy::arithmetic_side_effects, reason = "two constants, divided by a number that is not 0")]
 pub fn refute(
     documents: (&str, &str),

@@ -327,7 +327,8 @@ impl Trimmer {
                 }
             }
         }
-        // Numbers the clauses consecutively, without those that are not needed.
+        // The clauses of the formula keep their numbers, from 1. The derived clauses that are needed get the next
+        // numbers.
         let mut numbers = 1..;
         let mut places: Vec<i32> = numbers.by_ref().take(self.given).collect();
         let mut line = Vec::new();

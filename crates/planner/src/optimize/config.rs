@@ -31,8 +31,8 @@ pub enum Engine {
     Auto,
     /// The SAT solver only, together with the bounds that its formulas need.
     Sat,
-    /// Heuristic search only. With a horizon, the SAT solver is used as well if the search does not find a
-    /// cheapest plan within the horizon.
+    /// Heuristic search only. The SAT solver is used as well if actions can improve the metric, or if the search does
+    /// not find a cheapest plan within the horizon.
     Search,
 }
 

@@ -63,8 +63,8 @@ impl Search {
         Some(below.filter(|weight| *weight <= than / 2).max().unwrap_or(lightest))
     }
 
-    /// Raises the lower bound, reduces the weights of the core, and adds totalizer outputs as soft
-    /// literals. At least one literal of the core is true in every plan.
+    /// Raises the lower bound, reduces the weights of the core, and adds totalizer outputs as soft literals. At least
+    /// one literal of the core is true in every plan within the cost limit.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a core has weights that are at most what the limit leaves, and the least of them is taken off each"

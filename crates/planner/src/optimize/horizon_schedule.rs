@@ -30,7 +30,7 @@ pub(super) enum FirstPlanOutcome {
     /// There is no plan of any length, or no plan within the configured horizon.
     Refuted(Box<Solution>),
     Paused,
-    /// A limit was reached, the formulas become too large, or the cost of a plan overflows.
+    /// No further formula can be solved, for example because a limit was reached, or the cost of a plan overflows.
     Over,
 }
 
@@ -92,8 +92,8 @@ impl HorizonSchedule {
     }
 }
 
-/// Finds a first plan without a budget. Without a plan, returns a solution as an error: a proof that there is no
-/// plan (within the horizon), or the status `Unknown` if a limit is reached or the formulas become too large.
+/// Finds a first plan without a budget. Without a plan, returns a solution as an error: a proof that there is no plan
+/// (within the horizon), or the status `Unknown`.
 pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
     let mut first = HorizonSchedule::new(run);
     loop {

@@ -35,8 +35,7 @@ pub struct Point {
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Front {
-    /// Points in order, from the best by the first objective to the best by the second. If no plan is found, a
-    /// single point without a plan.
+    /// Points in the order of the first objective, best first. If no plan is found, a single point without a plan.
     pub points: Vec<Point>,
     /// `Optimal` if the front is proved complete; `Unsolvable` if it is proved that there is no plan; `Feasible` if
     /// there may be further points. If no plan was found for other reasons, the status of the first query.

@@ -32,10 +32,11 @@ const STATES_PER_CONFLICT: u64 = 4;
 const MAX_BACKOFF: u32 = 3;
 /// Maximum number of times that the budget of a component is doubled.
 const MAX_BOOST: u32 = 3;
-/// Minimum number of times that the budget for improving the best plan is doubled while a proof is not within
-/// reach.
+/// Minimum number of times that the budget for improving the best plan is doubled, unless a proof is within reach and
+/// A\* may finish.
 const MIN_BOOST: i32 = 2;
-/// Maximum number of times that the budget for improving the best plan is doubled while a proof is within reach.
+/// Maximum number of times that the budget for improving the best plan is doubled while a proof is within reach and
+/// A\* may finish.
 const NEAR_BOOST: i32 = 1;
 /// Numerator and denominator of a ratio. If the cost of a plan divided by the lower bound exceeds this ratio,
 /// a better plan is probably easier to find than a proof.

@@ -37,9 +37,9 @@ pub(super) fn proved_by_bound(mut run: Run<'_>, best: &Best) -> Solution {
     into_solution(run, best, 0, Some(proof))
 }
 
-/// Returns the solution for a plan that an exhausted search has proved optimal. The SAT solver tries to confirm
-/// optimality if the engine includes it and this takes little time or is configured. Without confirmation, the
-/// proof by search counts.
+/// Returns the solution for a plan that a search has proved optimal. The SAT solver tries to confirm optimality if
+/// the engine includes it and this takes little time or is configured. Without confirmation, the proof by search
+/// counts, or the proof by the bound if the cost equals the initial lower bound.
 pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPlan, lower: Int) -> Solution {
     let mut best = Best { plan, lower };
     run.announce(&best, best.plan.steps.len());

@@ -1,4 +1,4 @@
-//! Treats a metric without a best value: minimises the number of steps, and then the metric.
+//! Treats a metric that may have no best value: minimises the number of steps, and then the metric.
 
 use search::bounds::Bounds;
 use task::context::Context;

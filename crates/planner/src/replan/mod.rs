@@ -40,7 +40,7 @@ use usage::Usage;
 
 pub use query::{FirstStep, Progress, Query, ReplanOutcome};
 
-/// Each number in the initial state must be a multiple of 1/`PRECISION`.
+/// All multiples of 1/`PRECISION` are possible values of the task's numeric variables in a query.
 const PRECISION: Int = 1_000_000;
 const MAX_CACHED_SETS: usize = 8;
 

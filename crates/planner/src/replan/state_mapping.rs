@@ -31,9 +31,9 @@ pub(super) struct Layout {
     facts: FxHashMap<String, (Fact, bool)>,
     numbers: FxHashMap<String, usize>,
     scale: BigRational,
-    /// Static facts that must be true in every problem, numbered from 0.
+    /// Facts without a variable in the task that must be true in every problem, numbered from 0.
     fixed: FxHashMap<String, usize>,
-    /// Static numeric values that must be equal in every problem, numbered from 0.
+    /// Numeric values without a variable in the task that must be equal in every problem, numbered from 0.
     values: FxHashMap<String, (usize, BigRational)>,
     /// Values of the variables if no fact is true.
     nothing: Vec<u32>,

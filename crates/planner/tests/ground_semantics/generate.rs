@@ -39,7 +39,7 @@ pub const ALL: Features = Features {
     nonlinear: true,
 };
 
-/// Constructs that the planner supports.
+/// Constructs of tasks whose grounding is compared with the interpreter.
 pub const PLANNED: Features = Features {
     conditional: true,
     derived: true,

@@ -1,5 +1,5 @@
-//! Generates a valid plan whose final state defines the goal, and plans that differ from it in one place. The
-//! validator must judge these plans as the interpreter does.
+//! Generates a valid plan whose final state defines the goal, and plans that differ from it by one change.
+//! The validator must judge these plans as the interpreter does.
 
 use crate::ground_semantics::generate::Draw;
 use crate::ground_semantics::interpret::{State, Step, choices};

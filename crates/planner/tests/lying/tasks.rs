@@ -144,7 +144,8 @@ pub const TASKS: &[Example] = &[
           (:metric minimize (total-cost)))",
         optimum: Some("15"),
     },
-    // No action makes (at c) true, or the required numbers are unreachable.
+    // Three tasks without a plan: no action makes (at c) true, the numbers do not suffice, or the goal
+    // requires two places at once.
     Example {
         name: "island",
         domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b))

@@ -59,7 +59,7 @@ pub fn is_needed(domain: &Domain, problem: &Problem) -> bool {
         || domain.actions.iter().any(|action| !action.preferences.is_empty())
 }
 
-/// Returns `true` if the name belongs to an auxiliary action, which evaluates a preference or deadline.
+/// Returns `true` if the name belongs to an auxiliary action, for example one that evaluates a preference.
 pub fn is_hidden(action: &str) -> bool {
     action.contains(' ')
 }

@@ -3,7 +3,7 @@
 //!
 //! Relaxed reachability, a Datalog program after Helmert \[1\], computes the reachable instances of each action
 //! schema. Design parameters that can be chosen independently are slots and are not instantiated. Each instance
-//! becomes an operator with slots, mutex groups become finite-domain variables, and all numbers become integers
+//! becomes operators with slots, mutex groups become finite-domain variables, and all numbers become integers
 //! by scaling (or remain exact rationals if the caller requests this).
 //!
 //! The passes exchange the types in the module `vocabulary`:
@@ -78,8 +78,8 @@ pub fn ground(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Resu
     ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })
 }
 
-/// Grounds a problem to a task with numbers of type `N`. The ground task is also valid for other initial
-/// states, as specified by `generality`.
+/// Grounds a problem to a task with numbers of type `N`. The ground task is also valid for other initial numbers, as
+/// specified by `generality`.
 ///
 /// # Errors
 /// See [`ground`].

@@ -4,8 +4,9 @@
 //! In the explicit form (Metaplan paper, Listings 1 and 2), a schema has parameters `?fd` with a condition
 //! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable* and becomes a slot under three conditions. No fluent has it
 //! as an argument. It does not occur in conditions of effects, in conditions that mix static atoms and fluents, or in
-//! products and quotients with fluents. No start effect changes a number by it if a disjunction or the condition of an
-//! end effect compares this number. The number of designs then does not multiply the number of ground operators.
+//! products and quotients with fluents. No start effect changes a number by it if a disjunction over all or at the
+//! end, or the condition of an end effect, compares this number. The number of designs then does not multiply the
+//! number of ground operators.
 
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;

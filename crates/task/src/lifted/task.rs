@@ -51,8 +51,8 @@ pub struct Lifted {
     pub functions: Vec<Function>,
     pub schemas: Vec<Schema>,
     pub axioms: Vec<Axiom>,
-    /// Initial facts without duplicates: those of the file in its order, then those of timed literals at or
-    /// before time 0 and of auxiliary predicates.
+    /// Initial facts without duplicates: those of the file in its order, then those of auxiliary predicates. For
+    /// sequential execution, timed literals at or before time 0 are also applied.
     pub(crate) facts: Vec<(PredicateId, Arguments)>,
     pub(crate) values: Vec<(FunctionId, Arguments, Rational)>,
     /// Timed initial literals in chronological order.
@@ -77,8 +77,8 @@ pub struct Predicate {
     pub running: bool,
 }
 
-/// A numeric function. It is a fluent if an action changes it, or if it is auxiliary (times and chosen durations);
-/// otherwise it is static.
+/// A numeric function. It is a fluent if an action changes it, or if it is auxiliary (times and durations); otherwise
+/// it is static.
 #[derive(Debug, Clone)]
 pub struct Function {
     pub name: Name,
@@ -93,7 +93,8 @@ pub struct Function {
 pub struct Schema {
     pub name: Name,
     pub parameters: Vec<Parameter>,
-    /// Number of parameters and quantified variables.
+    /// Number of parameters and quantified variables, without those variables that were replaced by the only object
+    /// of their type.
     pub variables: usize,
     /// Condition on the state before the action.
     pub start_condition: Formula,
@@ -113,7 +114,8 @@ pub struct Schema {
     /// Set if start and end are simultaneous, because the duration is 0. `end_effects` then contains both
     /// sets of effects.
     pub joint: Option<Box<Joint>>,
-    /// Index of the action in the domain. Several schemas may represent one action.
+    /// Index of the action in the domain; several schemas may represent one action. If the task is split into
+    /// happenings, the index of this schema.
     pub action: u32,
     pub place: Place,
 }
@@ -136,7 +138,7 @@ pub struct Time {
     pub phase: PredicateId,
     /// Object for 0 past events; the objects for 1, 2, … past events have the next ids.
     pub first_phase: ObjectId,
-    /// True if the last step was a wait.
+    /// True if the last step was a wait or, if actions may overlap, a timed event after time 0.
     pub waited: PredicateId,
 }
 

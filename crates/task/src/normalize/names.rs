@@ -24,7 +24,8 @@ pub(super) struct Scope {
     variables: Vec<Name>,
     /// Terms of each variable name in scope; the innermost declaration comes last.
     terms: FxHashMap<Name, Vec<Term>>,
-    /// Number of parameters and quantified variables that were already declared, including those that are out of scope.
+    /// Number of parameters and quantified variables that already have a number, including those that are out of
+    /// scope.
     pub(super) bound: u32,
     pub(super) duration: Duration,
 }

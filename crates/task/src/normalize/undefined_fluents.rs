@@ -18,7 +18,7 @@ use pddl::ast::{Assignment, Name};
 
 type Guards = FxHashMap<FunctionId, PredicateId>;
 
-/// Adds guards (predicates that are true where the function has a value) to all numeric fluents except
+/// Adds guards (predicates that are true where the function has a value) to all functions that actions change, except
 /// `total-cost` and those that a metric reads.
 pub fn guard(lifted: &mut Lifted) {
     let guards = declare(lifted);

@@ -95,7 +95,7 @@ impl FromStr for Exact {
     }
 }
 
-/// A text that is neither a decimal nor a fraction.
+/// Error: the text is not an integer, a decimal, or a fraction with a divisor other than 0.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is not a number: a decimal such as `2.5` or a fraction such as `7/3` would be one")]
 pub struct NotANumber(String);
@@ -139,7 +139,7 @@ pub struct Step {
     pub start: Exact,
     /// Duration in the domain's time unit; 0 for an instantaneous action.
     pub duration: Exact,
-    /// Contribution of the action to the metric.
+    /// Contribution of the action to the metric. In a concurrent plan, total time does not count.
     pub cost: Exact,
 }
 

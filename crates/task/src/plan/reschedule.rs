@@ -2,7 +2,7 @@
 //!
 //! Waiting is free, so an optimal plan may delay an action until an event that only a later action needs. For
 //! each action, the operators for its other timeline windows are therefore tried, with the necessary waits. A
-//! change is kept if the result is still a plan, costs no more and has earlier starts.
+//! change is kept if the result is still a plan, costs no more, and has lexicographically smaller start times.
 
 use num_traits::Zero;
 

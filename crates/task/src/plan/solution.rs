@@ -36,29 +36,30 @@ pub enum Proof {
     /// The formula for plans of up to `step_bound` steps (cheaper than the known plan, if there is one) is
     /// unsatisfiable, and longer plans need not be considered.
     Sat {
-        /// Upper bound on the number of steps of a plan that is cheaper than the known plan or, if there is no plan, of
-        /// a shortest plan.
+        /// Upper bound on the number of steps of a plan that is cheaper than the known plan or, if there is no plan,
+        /// of a shortest plan. If [`Solution::unbounded`] is set, the fewest steps of a plan.
         step_bound: usize,
     },
     /// The cost of the plan equals a lower bound on the cost of all plans, for example the goal distance in a
     /// projection.
     Bound,
-    /// An exact search has terminated, for example A\* with an admissible heuristic. Its pruning preserves at least one
-    /// optimal plan, if there is a plan.
+    /// An exact search, for example A\* with an admissible heuristic, has terminated, or its lower bound has reached
+    /// the cost of the plan. Its pruning preserves at least one optimal plan, if there is a plan.
     Search,
-    /// The goal is unreachable in a relaxation or projection of the task. The text describes the reason.
+    /// The goal is found to be unreachable before the search, for example in a relaxation or projection of the task.
+    /// The text describes the reason.
     Relaxation(String),
 }
 
-/// Progress report of the optimiser: a better plan or a higher lower bound.
+/// Progress report of the optimiser: the best known plan and the lower bound.
 #[derive(Debug, Clone)]
 pub struct Improvement {
     /// Metric of the best known plan.
     pub cost: Exact,
     /// Bound on the metric: no plan has a better value.
     pub lower_bound: Exact,
-    /// Number of steps of the current SAT formula, or of the plan if a search reports the progress. For a concurrent
-    /// plan, the number of its happenings or, if durations are chosen, of its actions.
+    /// Number of steps of the current SAT formula or of the best known plan. For a concurrent plan, the number of its
+    /// happenings or, if durations are chosen, of its actions.
     pub horizon: usize,
 }
 
@@ -85,9 +86,9 @@ words! { MetricUnbounded, "reason": Proved = "proved", Suspected = "suspected" }
 /// Component of the planner that can find a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlannerPart {
-    /// A\* search with lower bounds.
+    /// Exact search, for example A\* with lower bounds.
     Search,
-    /// Satisficing search with relaxed plans and landmarks.
+    /// Satisficing search, for example with relaxed plans and landmarks.
     Satisficing,
     /// SAT-based planning.
     Sat,
@@ -128,9 +129,9 @@ pub struct Statistics {
     pub contradiction: Option<String>,
     /// Command line of an external program that reported a formula as unsatisfiable without a checked proof.
     pub unchecked: Option<String>,
-    /// Component that found the plan.
+    /// Component that found the plan, if this was recorded.
     pub found_by: Option<PlannerPart>,
-    /// Number of expanded states, over all searches.
+    /// Number of expanded states, over all searches that report it.
     pub expanded: u64,
     /// Number of generated successors.
     pub generated: u64,
@@ -160,13 +161,13 @@ pub struct Solution {
     /// Bound on the metric: no plan has a better value. `None` if the metric may be unbounded or no bound is
     /// known.
     pub lower_bound: Option<Exact>,
-    /// Number of steps up to which formulas have excluded better plans; 0 if none was solved. For an optimal plan, at
-    /// least its number of steps.
+    /// Number of steps up to which better plans are excluded; 0 if no such number was determined. For an optimal
+    /// plan, at least its number of steps. If `unbounded` is set, the number of steps of the plan.
     pub horizon: usize,
     /// Justification of the status.
     pub proof: Option<Proof>,
-    /// Set if the metric may have no best value. The plan then has the fewest steps, and the best metric that
-    /// was found among plans with this number of steps.
+    /// Set if the metric may have no best value and the plan is therefore one with the fewest steps. It has the best
+    /// metric that was found among plans with this number of steps.
     pub unbounded: Option<MetricUnbounded>,
     /// Statistics of the run.
     pub statistics: Statistics,

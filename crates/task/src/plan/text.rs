@@ -45,8 +45,8 @@ impl Exact {
     }
 }
 
-/// Writes the plan in the format of the planning competitions, which `pddl::validate::PlanText` parses. Each
-/// step is a line `(action arguments)`, or `start: (action arguments)  [duration]` if the plan has times.
+/// Writes the plan in the format of the planning competitions, which `pddl::validate::PlanText` parses. Each step is
+/// a line `start: (action arguments)  [duration]`, or `(action arguments)` if all starts and durations are 0.
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let timed = |step: &Step| !step.duration.is_zero() || !step.start.is_zero();

@@ -58,8 +58,8 @@ impl Task {
             .filter(|atom| atom.starts_with('('))
     }
 
-    /// Returns all actions with their arguments and designs, including inapplicable actions, but without
-    /// waits and auxiliary actions.
+    /// Returns the actions of all operators with their arguments and designs, whether applicable or not. Waits and
+    /// auxiliary actions are omitted. An action with several operators is repeated.
     pub fn actions(&self) -> impl Iterator<Item = (String, Vec<String>)> {
         let steps = self.ids().flat_map(move |id| {
             self.operators[id.index()].admitted_combinations().filter_map(move |choice| self.step(id, choice))

@@ -134,7 +134,7 @@ pub enum Argument {
 /// objects for the parameters that determine these data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Operator<N = Int> {
-    /// Index of the action schema in the domain; for a wait, the number of schemas.
+    /// Index in [`Task::schema_names`]; for a wait, the number of these names.
     pub schema: u32,
     pub arguments: Vec<Argument>,
     /// Functions that the action requires, each with the argument that is its design.
@@ -147,7 +147,7 @@ pub struct Operator<N = Int> {
     /// Conditional effects in order: later ones take precedence over earlier ones and over `effects`.
     pub conditional: Vec<ConditionalEffect>,
     pub numeric_effects: Vec<NumericEffect<N>>,
-    /// Cost in the task's cost unit; negative if the operator improves a reward metric.
+    /// Cost in the task's cost unit; negative if the operator improves the metric.
     pub cost: Quantity<N>,
     /// Costs under the other objectives of the task, in their units.
     pub others: Vec<Quantity<N>>,
@@ -173,7 +173,8 @@ pub struct State<N = Int> {
 pub struct Objective<N = Int> {
     /// Factor by which values of the metric are multiplied to obtain costs.
     pub scale: Int,
-    /// Constant that is added to the sum of operator costs, in scaled units.
+    /// Constant that is added to the sum of operator costs, in cost units: the value of the metric in the initial
+    /// state without the fluents in `rest`, negated for maximisation.
     pub offset: N,
     /// `true` if the metric is maximised; operator costs are then negated.
     pub maximize: bool,

@@ -9,8 +9,7 @@ use crate::task::quantity::{Number, Quantity, Table};
 /// Limit on the magnitude of the constant of a quantity plus the greatest magnitude in each of its tables.
 pub const QUANTITY_LIMIT: Int = 1 << 123;
 
-/// Number of summands (constant and tables) up to which [`LIMIT`] alone keeps a quantity below
-/// [`QUANTITY_LIMIT`].
+/// Number of summands (constant and tables) up to which [`LIMIT`] alone keeps a quantity within [`QUANTITY_LIMIT`].
 const SMALL_QUANTITY: usize = 32;
 
 /// Limit on the number of bits of rationals in a state. A state that exceeds the limit is pruned, and the

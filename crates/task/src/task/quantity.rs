@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
-/// A set of slots, as ascending positions in an operator's slot list.
+/// A set of slots, as ascending positions in an operator's slot list. Also the type of a combination of designs: one
+/// index for each slot of a set.
 pub type SlotSet = SmallVec<[u32; 2]>;
 
 /// A value for each combination of suitable designs of some slots.

@@ -14,7 +14,7 @@ use crate::lifted::{Bound, Formula};
 /// is false.
 ///
 /// # Errors
-/// The deadline has passed, the run is interrupted, or the condition is not supported.
+/// The deadline has passed, the run is interrupted, a fluent has no initial value, or the condition is not supported.
 pub fn residual(
     world: &mut World<'_>,
     formula: &Formula,
@@ -26,8 +26,8 @@ pub fn residual(
 /// Evaluates the condition of a conditional effect under a binding that assigns all slot parameters in it.
 ///
 /// # Errors
-/// A comparison has an undefined value, the deadline has passed, the run is interrupted, or the condition is
-/// not supported.
+/// A comparison has an undefined value, the deadline has passed, the run is interrupted, a fluent has no initial
+/// value, or the condition is not supported.
 pub fn residual_of_effect(
     world: &mut World<'_>,
     formula: &Formula,

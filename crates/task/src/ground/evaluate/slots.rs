@@ -28,8 +28,8 @@ impl Slots<'_> {
 /// indices).
 ///
 /// # Errors
-/// The expression is not linear, a part that mentions no slot is undefined, the deadline has passed, or the run
-/// is interrupted.
+/// The expression is not linear, a part that mentions no slot is undefined, a fluent has no initial value, the
+/// deadline has passed, or the run is interrupted.
 pub fn open(
     world: &mut World<'_>,
     expression: &Expression,

@@ -25,8 +25,8 @@ use crate::task::ForbiddenCombinations;
 use crate::task::quantity::{Linear, Quantity};
 
 /// Data that all instances of an action schema share if they have the same objects for the key parameters. These
-/// parameters occur in the duration, the functions of the slots (design parameters that selection assigns), or
-/// conditions and numeric effects that mention slots.
+/// parameters occur in the duration, in the functions of the slots, or in conditions and operands of effects that
+/// mention slots.
 pub(super) struct SharedInstanceData<'a> {
     pub(super) designs: Slots<'a>,
     pub(super) slots: Arc<GroundSlots>,
@@ -41,8 +41,8 @@ pub(super) struct SharedInstanceData<'a> {
     pub(super) duration: Quantity<Rational>,
 }
 
-/// Operand of a numeric effect. It is evaluated once for all instances that share the data, but only if it
-/// mentions slots.
+/// Operand of a numeric effect. If it mentions slots and its effect has no quantified variables, it is evaluated once
+/// for all instances that share the data; otherwise separately for each instance.
 pub(super) enum Operand {
     /// The operand mentions no slot, or the effect has quantified variables or is not numeric. The operand is
     /// evaluated separately for each instance.

@@ -37,8 +37,8 @@ impl<'a> Instantiation<'a> {
         Self { world, definitions: Definitions::default(), timeline }
     }
 
-    /// Returns one operator for each possible combination of a timeline window and a case. Returns `Failure::Undefined`
-    /// if the instance is never applicable.
+    /// Returns one operator for each possible combination of a timeline window and a case. If the instance is never
+    /// applicable, returns `Failure::Undefined` or an empty list.
     pub(super) fn operators(
         &mut self,
         outline: &SplitSchema<'_>,

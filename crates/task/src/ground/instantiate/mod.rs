@@ -53,7 +53,7 @@ use crate::number::dense;
 /// slots.
 ///
 /// # Errors
-/// Returns the first unsupported expression or condition of each action schema and of the goal, or an error
+/// Returns the first error of each action schema and of the goal, for example an unsupported expression, or an error
 /// if the deadline passes or the run is interrupted.
 pub fn instantiate<'a>(
     world: World<'a>,

@@ -12,8 +12,8 @@ pub(super) struct SplitSchema<'a> {
     pub(super) designs: &'a [SlotParameter],
     /// The design parameters that are slots.
     pub(super) parameters: &'a [SlotParameter],
-    /// Key parameters, in ascending order: those in the duration, in the functions of the slots, and in conditions and
-    /// numeric effects that mention slots. Instances with equal objects for these parameters share data.
+    /// Key parameters, in ascending order: those in the duration, in the functions of the slots, and in conditions
+    /// and operands of effects that mention slots. Instances with equal objects for these parameters share data.
     key: Vec<u32>,
     pub(super) start: Conjuncts<'a>,
     pub(super) over_all: Conjuncts<'a>,

@@ -19,7 +19,7 @@ use crate::lifted::Formula;
 use crate::lifted::configuration::conjuncts;
 use crate::limits::Interrupted;
 
-/// Prunes the task in place. Numbers are not used for pruning if `generality` lets initial numbers vary. Returns the
+/// Prunes the task in place. Values of numbers are not used if `generality` lets initial numbers vary. Returns the
 /// reason why the goal is unreachable if this is detected, and `None` otherwise. With a reason, the task is only
 /// partly pruned.
 pub fn prune(task: &mut GroundTask<'_>, generality: &Generality) -> Result<Option<String>, Interrupted> {

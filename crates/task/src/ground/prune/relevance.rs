@@ -10,8 +10,9 @@ use crate::lifted::Rational;
 use crate::limits::Interrupted;
 use crate::task::quantity::{NumericId, Quantity};
 
-/// Removes effects on numeric variables that no condition and no objective reads, not even through the new
-/// value of another variable that is read. Operator costs must already have been computed.
+/// Removes effects on numeric variables that no condition reads and whose final values are not part of an objective.
+/// A variable is also read if the new value of a read variable depends on it. Operator costs must already have been
+/// computed.
 pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
     let bodies = task.axioms.iter().map(|axiom| &axiom.body);
