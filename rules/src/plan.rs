@@ -107,8 +107,8 @@ pub(crate) enum Comparison {
     Different,
     /// Negation as failure of `Different`.
     NotDifferent,
-    /// Condition that the two names in the head of an equality rule are not identical. It only avoids
-    /// trivial conclusions `sameAs(x, x)`. Unlike [`Self::Different`], it also holds for fresh individuals.
+    /// Condition that the two terms in the head of an equality rule are not identical, which avoids trivial
+    /// conclusions `sameAs(x, x)`. Unlike [`Self::Different`], it also holds for fresh individuals.
     Guard,
 }
 
