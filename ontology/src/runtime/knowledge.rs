@@ -18,8 +18,8 @@ pub enum Mode {
     /// The conclusion is retracted.
     #[default]
     Retract,
-    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] turns conclusions into
-    /// assertions, and only assertions count for queries. The realisability of all designs is removed when a
+    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] without violations turns conclusions
+    /// into assertions, and only assertions count for queries. The realisability of all designs is removed when a
     /// component that had failed or recovered reports again. The status of a grounding is removed with the
     /// grounding, and the status of an objective when the objective is grounded. A failure in a design's
     /// error log is removed only with the objective.
