@@ -9,8 +9,8 @@ use super::binary;
 use super::decimal::Decimal;
 use super::temporal::{Duration, Moment};
 
-/// A literal. `Eq` and `Hash` compare values, not lexical forms, unless the datatype is unsupported or the literal is
-/// ill-typed.
+/// A literal. `Eq` and `Hash` compare values, not lexical forms, except for ill-typed literals and for
+/// [`Literal::Opaque`] ones that are not rational numbers.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 #[non_exhaustive]
 pub enum Literal {
@@ -126,8 +126,8 @@ impl Literal {
         }
     }
 
-    /// Returns a lexical form that depends only on the value, or the form as written for an unsupported datatype and
-    /// for an ill-typed literal.
+    /// Returns a lexical form that depends only on the value, or the form as written for an ill-typed literal and for
+    /// [`Literal::Opaque`] ones that are not rational numbers.
     pub fn lexical(&self) -> String {
         match self {
             Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {

@@ -254,8 +254,8 @@ impl Replayer<'_> {
     }
 }
 
-/// Removes the condition that the two names in the head of an equality rule differ. Without the
-/// condition, the rule additionally derives only pairs of names that are already equal.
+/// Removes the condition that the two terms in the head of an equality rule differ. Without the condition, the rule
+/// additionally derives only pairs of terms that are already equal, and pairs of literals that may have the same value.
 fn without_guards(program: &Program) -> Program {
     let mut program = program.clone();
     for rule in program.rules.iter_mut().filter(|_| program.equality) {
