@@ -181,12 +181,12 @@ impl Literal {
         }
     }
 
-    /// Returns `true` if the value is a number.
+    /// Returns `true` for a decimal, a float or a double.
     pub fn is_numeric(&self) -> bool {
         matches!(self, Self::Decimal(_) | Self::Float(_) | Self::Double(_))
     }
 
-    /// Returns the exact value of a finite number; `None` for other literals.
+    /// Returns the exact value of a decimal, a finite float or a finite double; `None` for other literals.
     pub fn as_rational(&self) -> Option<BigRational> {
         match self {
             Self::Decimal(value) => Some(value.to_rational()),
@@ -196,7 +196,7 @@ impl Literal {
         }
     }
 
-    /// Returns the nearest double of a number; `None` for other literals.
+    /// Returns the nearest double of a decimal, float or double; `None` for other literals.
     pub fn as_f64(&self) -> Option<f64> {
         match self {
             Self::Decimal(value) => Some(value.to_f64()),
