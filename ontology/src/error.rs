@@ -168,7 +168,7 @@ pub enum Error {
         /// The axiom in functional-style syntax, or the rule in SWRL's human-readable syntax.
         statement: String,
     },
-    /// O109: the engine rejects the change.
+    /// O109: an error of the rules or of the rule engine.
     #[error("error[O109]: {0}")]
     Engine(#[from] rules::Error),
 }

@@ -48,8 +48,7 @@ pub struct Change {
     pub delta: Delta,
     /// The new rules; `None` if they do not change.
     pub program: Option<Program>,
-    /// Warnings about statements that are not read, not used in full, or retracted without being stated, and about
-    /// imports of the documents, which are not followed.
+    /// Warnings of the reader, of lowering, and about retracted statements that were not stated.
     pub warnings: Vec<Warning>,
 }
 
