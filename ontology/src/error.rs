@@ -58,7 +58,7 @@ pub enum Error {
     Malformed {
         /// Position of the syntax error.
         position: Position,
-        /// Syntax detected from the content.
+        /// Syntax as which the document was parsed; RDF/XML if its encoding is invalid.
         syntax: Syntax,
         /// Message of the parser.
         message: String,
@@ -79,7 +79,7 @@ pub enum Error {
     UnresolvedImport {
         /// The importing document.
         file: String,
-        /// Position of the import, if the document contains the IRI literally.
+        /// First occurrence of the imported IRI, if the document contains the IRI literally.
         position: Option<Position>,
         /// The imported IRI.
         import: String,
@@ -157,7 +157,7 @@ pub enum Error {
     Unwritable {
         /// The output syntax.
         syntax: &'static str,
-        /// Description of the statement that the syntax cannot express.
+        /// Cause, usually the statement that the syntax cannot express.
         reason: String,
     },
     /// O114: a retracted statement has an anonymous individual.
@@ -165,10 +165,10 @@ pub enum Error {
         "error[O114]: {statement} cannot be retracted: an individual without a name is a different one in each document"
     )]
     Nameless {
-        /// The statement in functional-style syntax.
+        /// The axiom in functional-style syntax, or the rule in SWRL's human-readable syntax.
         statement: String,
     },
-    /// O109: the engine rejects the change.
+    /// O109: an error of the rules or of the rule engine.
     #[error("error[O109]: {0}")]
     Engine(#[from] rules::Error),
 }
@@ -223,7 +223,7 @@ pub enum Warning {
         /// 100.
         position: Option<Position>,
     },
-    /// O202: a statement that is not part of any OWL axiom or SWRL rule.
+    /// O202: a statement that is not read, usually because it is not part of any OWL axiom or SWRL rule.
     #[error("warning[O202]: not read: {statement} ({reason})")]
     Unread {
         /// The statement or its subject.
@@ -256,7 +256,7 @@ pub enum Warning {
         /// Index of the rule in its document, from 0.
         position: u32,
     },
-    /// O205: two documents declare one ontology IRI.
+    /// O205: two documents declare one ontology IRI, with the same version IRI or both without one.
     #[error("warning[O205]: {first} and {second} both declare the ontology <{iri}>; both are read")]
     SameOntologyTwice {
         /// The ontology IRI.
@@ -273,7 +273,7 @@ pub enum Warning {
     MissingImport {
         /// The importing document.
         file: String,
-        /// Position of the import, if the document contains the IRI literally.
+        /// First occurrence of the imported IRI, if the document contains the IRI literally.
         position: Option<Position>,
         /// The imported IRI.
         import: String,
@@ -283,7 +283,7 @@ pub enum Warning {
         "warning[O207]: nothing states {statement}, so it cannot be retracted; conclusions from other statements remain"
     )]
     NotStated {
-        /// The statement in functional-style syntax.
+        /// The axiom in functional-style syntax, or the rule in SWRL's human-readable syntax.
         statement: String,
     },
     /// O208: a document that changes a knowledge base has an import.
@@ -294,18 +294,18 @@ pub enum Warning {
     ImportOfUpdate {
         /// The importing document.
         file: String,
-        /// Position of the import, if the document contains the IRI literally.
+        /// First occurrence of the imported IRI, if the document contains the IRI literally.
         position: Option<Position>,
         /// The imported IRI.
         import: String,
     },
-    /// O301: an axiom, or a part of it, is outside the OWL 2 RL profile.
+    /// O301: an axiom, or a part of it, is not used, usually because it is outside the OWL 2 RL profile.
     #[error(
         "warning[O301]: {axiom} is {} ({reason}); conclusions that need {} are not drawn",
         if *partly { "used in part" } else { "left out" }, if *partly { "the rest" } else { "it" }
     )]
     OutsideProfile {
-        /// The axiom in functional-style syntax.
+        /// The axiom in functional-style syntax, or a description of the omitted rules.
         axiom: String,
         /// `true` if a part of the axiom is used, `false` if nothing of it is.
         partly: bool,

@@ -235,8 +235,8 @@ pub enum Atom {
     BuiltIn(Iri, Vec<Argument>),
 }
 
-/// A SWRL rule: if the body holds, so does the head. Variables range over named individuals and data values
-/// (DL-safe).
+/// A SWRL rule: if the body holds, so does the head. Variables range only over the individuals, named or anonymous, and
+/// the data values that occur in the knowledge base (DL-safe).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rule {
     /// IRI of the ontology that states the rule; the document's name if the ontology has no IRI.
@@ -245,7 +245,7 @@ pub struct Rule {
     pub position: u32,
     /// The rule's own IRI, if it has one.
     pub iri: Option<Iri>,
-    /// The first `rdfs:label`. Labels are not unique in real knowledge bases.
+    /// One of the `rdfs:label` annotations. Labels are not unique in real knowledge bases.
     pub label: Option<Arc<str>>,
     /// Value of `swrla:isRuleEnabled`, if stated. Reasoners such as Pellet ignore it.
     pub enabled: Option<bool>,
@@ -279,7 +279,7 @@ pub struct Ontology {
     pub entities: Vec<(EntityKind, Iri)>,
     /// Logical axioms, sorted.
     pub axioms: Vec<AnnotatedAxiom>,
-    /// Annotations of entities (subject, annotation), sorted.
+    /// Annotations of entities, ontologies and other IRIs (subject, annotation), sorted.
     pub annotations: Vec<(Iri, Annotation)>,
     /// Annotations of annotations: subject, annotation, annotation of the annotation; sorted.
     pub annotation_annotations: Vec<(Iri, Annotation, Annotation)>,

@@ -1,5 +1,6 @@
 //! Computes the delta that updates the rule engine when documents are asserted and retracted. After the
-//! update, the engine holds exactly the consequences of the remaining statements.
+//! update, the engine holds exactly the consequences of the remaining statements and of the facts that other updates
+//! have stated.
 //!
 //! [`Stated`] keeps the stated axioms and rules. [`lower_together`] translates them to facts and rules, once before
 //! and once after the change. The engine receives the differences between the two results.
@@ -8,7 +9,7 @@
 //! individuals. They are needed nevertheless in the following cases. A rule derives members of `owl:Thing`, which
 //! depend on all stated names. The change declares a class or property while the engine reasons about equality
 //! (`owl:sameAs`). An individual of the change is also declared as a class or property. A class or property belongs
-//! to OWL's own vocabulary.
+//! to the vocabulary of RDF, RDFS, XML Schema, OWL or SWRL.
 //!
 //! Axioms form a set: an axiom of two documents is stated once, and one retraction removes it. Declarations are
 //! never retracted, because many documents repeat them.
@@ -47,8 +48,7 @@ pub struct Change {
     pub delta: Delta,
     /// The new rules; `None` if they do not change.
     pub program: Option<Program>,
-    /// Warnings about statements that are not read, not used in full, or retracted without being stated, and about
-    /// imports of the documents, which are not followed.
+    /// Warnings of the reader, of lowering, and about retracted statements that were not stated.
     pub warnings: Vec<Warning>,
 }
 
@@ -252,10 +252,10 @@ impl Stated {
         program.equality && assertions.entities.iter().any(is_new)
     }
 
-    /// Returns `true` if the change can be computed without a translation of the whole ontology. Then
-    /// `axioms` are only assertions about individuals by named classes and properties, and no rule of
-    /// `program` derives members of `owl:Thing`. The names must not belong to OWL's own vocabulary, and no
-    /// individual may also be declared as something else. [`Stated::declares`] covers declarations of the change itself.
+    /// Returns `true` if the change can be computed without a translation of the whole ontology. Then `axioms` are only
+    /// assertions about individuals by named classes and properties, and no rule of `program` derives members of
+    /// `owl:Thing`. The names must not belong to a reserved vocabulary, and no individual may also be declared as
+    /// something else. [`Stated::declares`] covers declarations of the change itself.
     fn is_plain(&self, axioms: &[AnnotatedAxiom], program: &Program, symbols: &Symbols) -> bool {
         // The rules and facts of `owl:Thing` depend on all names that are stated.
         let thing = symbols.find_name(owl::THING);

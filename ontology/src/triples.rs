@@ -12,7 +12,8 @@ pub(crate) struct Document {
     pub syntax: Syntax,
     pub iri: Option<Arc<str>>,
     pub version: Option<Arc<str>>,
-    /// Imported IRIs in order of appearance. The position is known if the text contains the IRI literally.
+    /// Imported IRIs in order of appearance, each with the position of its first occurrence, if the text contains the
+    /// IRI literally.
     pub imports: Vec<(String, Option<Position>)>,
     pub triples: Vec<Compact>,
 }

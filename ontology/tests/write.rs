@@ -21,7 +21,8 @@ const ALL: [OutputSyntax; 5] = [
     OutputSyntax::Functional,
 ];
 
-/// All conclusions as text, without those about anonymous individuals, whose names may change.
+/// All facts that hold, as text, without those about anonymous individuals, whose names may change, and without those of
+/// auxiliary relations.
 fn conclusions(ontology: &Ontology) -> BTreeSet<String> {
     let mut symbols = Symbols::new();
     let lowered = lower_with(ontology, Equality::Owl, &mut symbols);

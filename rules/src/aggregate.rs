@@ -15,8 +15,8 @@ use crate::symbol::{Symbol, Symbols};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Function {
     pub aggregate: Aggregate,
-    /// Aggregated operand: the value in a column of each row, or a constant. A column is given as the number of a
-    /// variable. Ignored by `count`.
+    /// Aggregated operand: a column of the rows, or a constant. `Source::Variable` holds the position of the column in
+    /// the row, not the number of a variable of the rule. Ignored by `count`.
     pub value: Source,
 }
 

@@ -138,8 +138,8 @@ impl fmt::Display for DisplayViolation<'_> {
 }
 
 impl Derivation {
-    /// Formats the derivation as an indented tree, with one line for each fact with its reason, for each absent fact
-    /// and for each aggregate. A fact that occurs again is not explained again.
+    /// Formats the derivation of the first step as an indented tree, with one line for each fact with its reason, for
+    /// each absent fact and for each aggregate. A fact that occurs again is not explained again.
     pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
         DisplayDerivation { derivation: self, symbols }
     }

@@ -112,7 +112,7 @@ pub enum Error {
         /// Name of the variable, without question mark.
         variable: String,
     },
-    /// A variable of the body that no atom binds: it occurs only in negated atoms, comparisons or built-ins.
+    /// A variable of the body that no atom binds, for example because it occurs only in negated atoms and comparisons.
     #[error("R203 rule {rule}: variable ?{variable} is only tested, never bound")]
     UnsafeBody {
         /// The rule.
@@ -193,7 +193,7 @@ pub enum Error {
     /// The evaluation was interrupted. The engine is in its state before the update.
     #[error("R304 interrupted, last in rule {rule}")]
     Interrupted {
-        /// The rule that was being evaluated.
+        /// The rule that was being planned or evaluated.
         rule: RuleIdentity,
     },
     /// A fact or rule with a symbol that is not interned.

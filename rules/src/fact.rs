@@ -25,7 +25,7 @@ impl Fact {
         Self { predicate, arguments: arguments.into_iter().collect() }
     }
 
-    /// Formats the fact as `predicate(argument, …)`, with names as they were interned.
+    /// Formats the fact as `predicate(argument, …)`, with full names in angle brackets.
     pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
         DisplayFact { fact: self, symbols }
     }

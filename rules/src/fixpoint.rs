@@ -1,9 +1,9 @@
 //! Executes join plans of rules: a fixed program of crepe (a Datalog compiler) interprets their steps.
 //!
-//! A block is a list of matches of a rule's body. The tuples of the program contain only the numbers of blocks, so
-//! that crepe's bookkeeping costs nothing per match, and the store is never copied. `Match` holds blocks of matches,
-//! each with the number of plan steps that were executed; `Head` holds blocks of complete matches. A step consumes
-//! a block and returns a new block. It reads the store, to which the program has a reference.
+//! A block is a list of matches of a rule's body. The tuples of the program contain the numbers of blocks instead of
+//! matches, so that crepe's bookkeeping costs nothing per match, and the store is never copied. `Match` holds blocks of
+//! matches, each with the number of plan steps that were executed; `Head` holds blocks of complete matches. A step
+//! consumes a block and returns a new block. It reads the store, to which the program has a reference.
 //!
 //! A small block passes several steps at once, because crepe's bookkeeping would take longer than the steps. In a
 //! typical update, each plan starts from one or two matches, which pass all steps before the program would start.
@@ -70,8 +70,8 @@ pub(crate) struct Round<'a> {
     pub widths: &'a [usize],
     pub symbols: RefCell<&'a mut Arc<Symbols>>,
     pub rows: &'a [Row],
-    /// `true` while invalid derivations are searched: the plans then match all rows that held before the update. The
-    /// store also contains newer rows.
+    /// `true` while invalid derivations are searched. Joins then match all rows of the store: those that held before
+    /// the update, and newer ones.
     pub retracting: bool,
     pub budget: &'a Budget,
     pub blocks: RefCell<Vec<Vec<Symbol>>>,

@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::literal::Literal;
 use crate::rule::RuleIdentity;
 
-/// Default number of steps that one update may take.
+/// Default of [`Limits::steps`].
 pub const DEFAULT_STEP_BUDGET: u64 = 10_000_000_000;
 
 /// Steps charged for a value that a recursive rule computes for the first time. Only the budget stops a
@@ -28,13 +28,13 @@ const MAX_SHOWN_CHARACTERS: usize = 40;
 /// Number of visited rows and charged steps between two calls of the interrupt function.
 const ROWS_PER_INTERRUPT_CHECK: u64 = 1 << 14;
 
-/// Limits of one derivation or update.
+/// Limits of derivations and updates.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// Number of steps that one update may take. Roughly, a step extends one partial match of a rule's body. A value
-    /// that a recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8 bytes of its
-    /// digits or text. Other new values cost a step for every 8 bytes. A new value of more than 16 MiB exhausts the
-    /// budget.
+    /// Maximum number of steps of one evaluation of the rules. An update can consist of several evaluations, for
+    /// example if rules derive equalities. Roughly, a step extends one partial match of a rule's body. A value that a
+    /// recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8 bytes of its digits
+    /// or text. Other new values cost a step for every 8 bytes. A new value of more than 16 MiB exhausts the budget.
     pub steps: u64,
     /// Function that can stop an update. It is called after about every 16,000 visited rows and charged
     /// steps.

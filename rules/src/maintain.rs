@@ -479,7 +479,7 @@ fn touch(touched: &mut [bool], network: &Network, relation: RelationId) {
 }
 
 /// Returns `true` if a pair of equal names connects two names that this update has not connected yet. A
-/// pair with a literal always counts as new, because it is a contradiction that must be reported.
+/// pair with a literal always counts as new, because it can be a contradiction, which must be reported.
 fn joins(joined: &mut Forest, symbols: &Symbols, pair: &[Symbol]) -> bool {
     pair.iter().any(|&symbol| symbols.as_literal(symbol).is_some()) || joined.connect(pair[0], pair[1])
 }

@@ -211,9 +211,9 @@ fn bad_pattern(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     })
 }
 
-/// Computes the stratum of each relation. Every relation depends on equality, but needs no later stratum
-/// for this reason, since the rows are rewritten when equality changes. Returns an error for each
-/// negation or aggregate within a stratum.
+/// Computes the stratum of each relation. Every relation depends on equality, but needs no later stratum for this
+/// reason, since the rows are rewritten when equality changes. Returns an error for each negation, aggregate or test
+/// for unequal names whose relation depends on the conclusions of the rule.
 fn stratify(
     program: &Program,
     symbols: &Symbols,

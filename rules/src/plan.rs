@@ -107,8 +107,9 @@ pub(crate) enum Comparison {
     Different,
     /// Negation as failure of `Different`.
     NotDifferent,
-    /// Condition that the two names in the head of an equality rule are not identical. It only avoids
-    /// trivial conclusions `sameAs(x, x)`. Unlike [`Self::Different`], it also holds for fresh individuals.
+    /// Condition that the two terms in the head of an equality rule are neither identical nor literals that may have
+    /// the same value. It avoids trivial conclusions `sameAs(x, x)`. Unlike [`Self::Different`], it also holds for
+    /// fresh individuals.
     Guard,
 }
 

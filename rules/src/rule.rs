@@ -14,8 +14,8 @@ pub struct Variable(pub u16);
 /// An argument of an atom.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub enum Term {
-    /// A variable. Its values are symbols in facts and computed literals, never unnamed individuals, so every rule is
-    /// DL-safe.
+    /// A variable. Its values are symbols of facts and rules and computed literals, never unnamed individuals, so every
+    /// rule is DL-safe.
     Variable(Variable),
     /// A name or literal.
     Constant(Symbol),
@@ -42,7 +42,8 @@ pub enum Atom {
     BuiltIn {
         /// The built-in.
         built_in: BuiltIn,
-        /// The result, if any, comes first, as in `swrlb`.
+        /// In the order of `swrlb`: the result of a function comes first. A built-in that composes a value of parts can
+        /// also compute the parts, i.e. the other arguments, from the first one.
         arguments: Vec<Term>,
     },
     /// The built-in does not hold: negation as failure, in bodies only. It thus also holds if an argument is of an
@@ -67,9 +68,10 @@ pub enum Atom {
     },
     /// Both terms denote the same individual or value. In a head: concludes `owl:sameAs`.
     Same(Term, Term),
-    /// In a body: the terms differ for certain. Names are unique by default, so any two different names differ;
-    /// literals are compared by value. With [`Program::with_equality`](crate::Program::with_equality), the atom
-    /// matches facts of `owl:differentFrom` instead.
+    /// In a body: the terms differ for certain. Names are unique by default, so two different names differ, except
+    /// those of [fresh individuals](Symbols::fresh_name); literals are compared by value. With
+    /// [`Program::with_equality`](crate::Program::with_equality), the atom matches facts of `owl:differentFrom`
+    /// instead.
     ///
     /// In a head: concludes `owl:differentFrom`.
     Different(Term, Term),
@@ -90,11 +92,11 @@ pub enum Aggregate {
     /// Sum of a term over all matches; 0 without matches. The sum is exact for decimals, and otherwise
     /// has the widest floating-point type among the values. There is no sum if a value is not a number.
     Sum(Term),
-    /// Minimum of a term over all matches. There is no minimum without matches, or if a value is not comparable with
-    /// it, such as text among numbers.
+    /// Minimum of a term over all matches. There is no minimum without matches, or if a value is an individual or not
+    /// comparable with it, such as text among numbers.
     Min(Term),
-    /// Maximum of a term over all matches. There is no maximum without matches, or if a value is not comparable with
-    /// it, such as text among numbers.
+    /// Maximum of a term over all matches. There is no maximum without matches, or if a value is an individual or not
+    /// comparable with it, such as text among numbers.
     Max(Term),
 }
 

@@ -163,7 +163,7 @@ impl Symbols {
             }
     }
 
-    /// Returns `true` if two symbols are different names or literals with certainly different values.
+    /// Returns `true` if two symbols are different, except for two literals that may have the same value.
     pub(crate) fn are_distinct(&self, left: Symbol, right: Symbol) -> bool {
         left != right
             && match (self.as_literal(left), self.as_literal(right)) {

@@ -58,8 +58,8 @@ pub enum Obstacle {
         /// Arguments of the built-in; a function has its result first. An argument without a value, such
         /// as the result of a function that is undefined or not interned, is `None`.
         arguments: Vec<Option<Symbol>>,
-        /// Exact absolute difference of the arguments, if the built-in has two and both are numbers; otherwise
-        /// `None`.
+        /// Exact absolute difference of the arguments, if the built-in has two and both are finite numbers;
+        /// otherwise `None`.
         gap: Option<BigRational>,
     },
     /// A negated built-in is true.
@@ -77,16 +77,17 @@ pub enum Obstacle {
         wanted: Option<Symbol>,
         /// Actual value; `None` if the aggregate has no value.
         found: Option<Literal>,
-        /// Exact absolute difference of the required and the actual value; `None` unless both are numbers.
+        /// Exact absolute difference of the required and the actual value; `None` unless both are finite numbers.
         gap: Option<BigRational>,
     },
-    /// Two terms must differ, but are equal or not known to differ; or they must be equal, but differ.
+    /// Two terms must differ, but are equal or not known to differ; or they must be equal or possibly equal, but are
+    /// not.
     Equality {
         /// First term.
         left: Symbol,
         /// Second term.
         right: Symbol,
-        /// `true` if the terms must be equal, `false` if they must differ.
+        /// `true` if the terms must be equal or possibly equal, `false` if they must differ.
         wanted: bool,
     },
 }

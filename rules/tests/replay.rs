@@ -136,7 +136,7 @@ fn derivations_use_names_as_written_in_rules() {
         ("r(?x) ^ sameAs(?x, b) -> p(?x) . p(?y) -> sameAs(b, a) .", "r(b), r(c)"),
         ("sameAs(?x, b) -> p(?x) . p(b) -> sameAs(b, a) . p(a) -> sameAs(c, a) .", "q(c)"),
     ] {
-        // The facts about `p` come first, so that `a` is the representative of all its names.
+        // The first rule interns `a` before its other names, so that `a` is their representative.
         let (text, mut symbols) = (format!("p(a) ^ never(a) -> p(a) . {rules}"), Symbols::new());
         let program = parse_rules(&text, "test", &mut symbols, &prefixes()).expect("rules");
         let program = Program { equality: true, ..program };

@@ -44,7 +44,8 @@ pub struct Arguments {
     /// Assume that different names denote different individuals, as in PDDL but not in OWL.
     #[arg(long)]
     unique_names: bool,
-    /// Maximum number of inference steps of one update. If it is exceeded, the error names the rule that was being
+    /// Maximum number of inference steps of one evaluation of the rules. The rules are evaluated again when they derive
+    /// that individuals are equal. If the number is exceeded, the error names the rule that was being
     /// evaluated then; often this rule does not terminate.
     #[arg(long, value_name = "N", default_value_t = DEFAULT_STEP_BUDGET)]
     step_limit: u64,

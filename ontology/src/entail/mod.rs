@@ -30,7 +30,8 @@ pub use tautology::tautology;
 /// A statement and the result of its proof.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entailment {
-    /// The statement in functional-style syntax.
+    /// The axiom in functional-style syntax, or all axioms of a conjunctive query. Rules and unread statements are
+    /// given as text in another form.
     pub statement: String,
     /// Result of the proof.
     pub answer: Answer,

@@ -307,8 +307,9 @@ fn all_values(
     inner.into_iter().map(|(body, head)| (with_atom(edge.clone(), body), head)).collect()
 }
 
-/// Returns the conclusion that `x` is in the auxiliary relation of a restriction that `class` implies.
-/// Returns no conclusion if no condition needs such a restriction.
+/// If `class` implies a restriction (for example `∃p.C`) that is included in a restriction in the condition of an axiom
+/// or rule, returns the conclusion that `x` is in the auxiliary relation of the implied restriction. Otherwise returns
+/// no conclusion. See [`super::inclusion`].
 fn included(context: &mut Context, class: &ClassExpression, x: Term) -> Conclusions {
     let restriction = context.inclusions.conclusion(class);
     let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));

@@ -16,7 +16,8 @@ use crate::vocab::{local_name, owl};
 pub const INTERNAL: &str = "urn:metaplan:";
 
 /// Source in the identity of a rule that is lowered from an axiom or from OWL's own vocabulary. The label of
-/// such a rule is the axiom in functional-style syntax, or a short name of the rule.
+/// such a rule is an axiom or class expression in functional-style syntax, truncated if it is long, or a short name of
+/// the rule.
 pub const AXIOM_SOURCE: &str = "http://www.w3.org/2002/07/owl";
 
 /// Semantics of the names of individuals.
@@ -54,8 +55,8 @@ pub(crate) struct Context<'a> {
     /// Rules of the auxiliary relations. They are not in `rules`, because several axioms and rules share a relation, and
     /// the first of them may be removed.
     pub auxiliary: Vec<Rule>,
-    /// Maps the address of an IRI's text to the symbol of the IRI. An ontology keeps each text once, so
-    /// the look-up need not read the text.
+    /// Maps the address of an IRI's text to the symbol of the IRI. Documents that are read together share equal texts,
+    /// so the look-up need not read the text.
     shared: FxHashMap<*const u8, Symbol>,
 }
 

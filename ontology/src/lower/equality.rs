@@ -1,9 +1,10 @@
 //! Equality and difference of individuals: table 4 of OWL 2 RL.
 //!
 //! OWL makes no unique name assumption: two names can denote the same individual. If a functional property has two
-//! values, for example, both names denote one individual. The engine then treats `sameAs` as equality.
-//! `differentFrom` holds if it is stated, or follows from disjoint classes or from different values of functional or
-//! inverse functional properties. It is derived only if a rule depends on it.
+//! values, for example, both names denote one individual. The engine then treats `sameAs` as equality. `differentFrom`
+//! holds if it is stated, if a rule of the knowledge base concludes it, or if it follows from disjoint named classes,
+//! from different values of functional properties, or from different subjects of inverse functional ones. Differences
+//! of the last three kinds are derived only if a rule depends on `differentFrom`.
 //!
 //! Under the unique name assumption ([`UniqueNames`](super::Equality::UniqueNames)) any two names differ, and the only
 //! rule of this file is the constraint that no two names are the same. A functional object property, a cardinality of at

@@ -8,7 +8,7 @@
 //! analogous, with `q ⊑ p`.
 //!
 //! The inclusions of classes and properties are a transitive closure. It consists of the stated inclusions,
-//! `C ⊓ D ⊑ C`, `C ⊑ C ⊔ D`, and the inclusions between restrictions that this module finds.
+//! `C ⊑ owl:Thing`, `C ⊓ D ⊑ C`, `C ⊑ C ⊔ D`, and the inclusions between restrictions that this module finds.
 //!
 //! [1] OWL 2 Web Ontology Language Profiles, W3C 2012, section 4.3.
 
@@ -19,7 +19,7 @@ use crate::vocab::owl;
 
 #[derive(Default)]
 pub(crate) struct Inclusions {
-    /// Maps each restriction that an axiom concludes to the restrictions that include it and are
+    /// Maps each restriction that an axiom or rule concludes to the restrictions that include it and are
     /// conditions of axioms or rules.
     concluded: BTreeMap<ClassExpression, BTreeSet<ClassExpression>>,
     conditions: HashSet<ClassExpression>,

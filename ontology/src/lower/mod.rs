@@ -43,8 +43,8 @@ pub struct Lowered {
     pub facts: Vec<Fact>,
     /// Number of SWRL rules omitted because an equal rule occurs before, in any of the ontologies.
     pub duplicates: usize,
-    /// Warnings about omitted axioms and rules, and about rules that are used although their annotation
-    /// disables them.
+    /// Warnings about axioms and rules that are not used in full, and about rules that are used although their
+    /// annotation disables them.
     pub warnings: Vec<Warning>,
 }
 
@@ -167,9 +167,9 @@ impl Context<'_> {
         Ok(bodies)
     }
 
-    /// Removes the rules that the engine rejects, each with a warning. One such rule would make the engine
-    /// reject the whole program. Omits the test for a rule lowered from an axiom if its body has a relation
-    /// atom, or an equality with a constant: lowering then binds all variables.
+    /// Removes the rules that the engine rejects, and other rules with the same identity, with a warning. One such rule
+    /// would make the engine reject the whole program. Omits the test for a rule lowered from an axiom if its body has
+    /// a relation atom, or an equality with a constant: lowering then binds all variables.
     fn drop_unusable(&mut self) {
         let binds = |atom: &Atom| match atom {
             Atom::Relation { .. } => true,

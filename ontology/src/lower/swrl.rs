@@ -44,7 +44,7 @@ pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
 }
 
 /// Returns body and head with the atoms of the body sorted, and with variables numbered in this order. The
-/// result is equal for rules that differ in the names of variables or in the order of atoms, unless a body has
+/// result is equal for rules that differ in the names of variables or in the order of body atoms, unless a body has
 /// several atoms with one predicate.
 fn canonical(rule: &rules::Rule) -> (Vec<rules::Atom>, Vec<rules::Atom>) {
     // Sorting must not depend on the numbers of variables.

@@ -17,7 +17,7 @@ struct NameUse {
     reserved: bool,
     /// `true` if the name is a blank node, or may be part of an axiom, a list, a rule or a header.
     special: bool,
-    /// `true` if the name is a blank node or has a type of OWL's own vocabulary.
+    /// `true` if the name is a blank node or has a type of a reserved vocabulary other than `owl:NamedIndividual`.
     declared: bool,
     class: bool,
     object: bool,

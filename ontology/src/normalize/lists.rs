@@ -128,7 +128,7 @@ fn chain_fault(graph: &Graph, item: &Term) -> Option<String> {
 }
 
 /// Replaces a list by a copy in every triple that refers to it, except the first, because horned-owl consumes lists.
-/// Removes the types of list nodes.
+/// Removes the types `rdf:List` of list nodes.
 fn unshare(graph: &mut Graph) {
     let references = graph.references();
     let mut visited = std::collections::HashSet::new();

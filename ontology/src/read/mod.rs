@@ -45,7 +45,7 @@ use text::{Text, Visited};
 /// A document that is reached several times, possibly under different names, is read once.
 ///
 /// # Errors
-/// Returns the errors of all documents: unreadable files, syntax errors with positions, unresolved imports. (After at
+/// Returns the errors of all documents, such as unreadable files, syntax errors and unresolved imports. (After at
 /// most ten syntax errors, the rest of a document is not read.) Without them, returns the first error of the merged
 /// documents (O105, O112). If catalogs in the options cannot be used (O104), returns only these errors.
 pub fn read_files<P: AsRef<Path>>(files: &[P], options: &ReadOptions) -> Result<Ontology, Errors> {

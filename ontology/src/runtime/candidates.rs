@@ -7,9 +7,9 @@
 //! attribute without a measurement excludes no design. MROS raises an exception in this case, and for a
 //! design that violates two attributes.
 //!
-//! The utility is PLANTA's `fd_utility` if the knowledge base concludes it. Otherwise it is the estimation of
-//! the attribute type `performance` if there is exactly one, or else 0.001. If the caller names an attribute,
-//! its estimation is the utility instead.
+//! The utility is PLANTA's `fd_utility` if the knowledge base concludes or states one value of it. Otherwise it is the
+//! estimation of the attribute type `performance` if there is exactly one, or else 0.001. If the caller names an
+//! attribute, its estimation is the utility instead.
 //!
 //! Each design also has the requirements of the objective that its estimations do not meet, without those on
 //! attributes with a comparison operator. Only the rules of the knowledge base define on which side of a

@@ -18,8 +18,8 @@ pub enum Mode {
     /// The conclusion is retracted.
     #[default]
     Retract,
-    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] turns conclusions into
-    /// assertions, and only assertions count for queries. The realisability of all designs is removed when a
+    /// The conclusion remains, as in the MROS reasoner. Each [`Runtime::conclude`] without violations turns conclusions
+    /// into assertions, and only assertions count for queries. The realisability of all designs is removed when a
     /// component that had failed or recovered reports again. The status of a grounding is removed with the
     /// grounding, and the status of an objective when the objective is grounded. A failure in a design's
     /// error log is removed only with the objective.
@@ -31,7 +31,7 @@ pub enum Mode {
 pub struct Runtime {
     pub(super) engine: Engine,
     pub(super) mode: Mode,
-    /// In latch mode, facts that may have been derived since the last cycle.
+    /// In latch mode, facts that may have been derived since conclusions were last turned into assertions.
     pub(super) pending: BTreeSet<Fact>,
     /// Maps each latched fact, i.e. each conclusion that became an assertion, to its derivation.
     pub(super) reasons: BTreeMap<Fact, Derivation>,
@@ -46,7 +46,7 @@ impl Runtime {
         let relations = facts.iter().map(|fact| (fact.predicate, fact.arguments.len())).collect();
         let pending = match mode {
             Mode::Retract => BTreeSet::new(),
-            // The initial conclusions become assertions at the end of the first cycle.
+            // The initial conclusions become assertions at the end of the first cycle without violations.
             Mode::Latch => facts.into_iter().filter(|fact| !engine.is_asserted(fact)).collect(),
         };
         Self { engine, mode, pending, reasons: BTreeMap::new(), relations }
@@ -116,7 +116,7 @@ impl Runtime {
         let violations = self.engine.violations();
         if self.mode == Mode::Latch && violations.is_empty() {
             let pending = std::mem::take(&mut self.pending).into_iter();
-            // Only facts that changed since the last cycle are examined.
+            // Only facts that changed since the last cycle without violations are examined.
             let insert: Vec<Fact> = pending.filter(|fact| self.is_latched(fact)).collect();
             let reasons: Vec<_> =
                 insert.iter().filter_map(|fact| Some((fact.clone(), self.engine.why(fact)?))).collect();
@@ -127,8 +127,8 @@ impl Runtime {
         Ok(violations)
     }
 
-    /// Returns `true` if a fact is derived, is not asserted, and belongs to a relation that reasoners
-    /// store: neither an auxiliary relation nor an equality.
+    /// Returns `true` if a fact is derived, is not asserted, and belongs to a relation that reasoners store: neither an
+    /// auxiliary relation nor `sameAs` or `differentFrom`.
     fn is_latched(&self, fact: &Fact) -> bool {
         let name = self.engine.symbols().value(fact.predicate).as_name().unwrap_or_default();
         let is_stored = !name.starts_with(INTERNAL) && ![owl::SAME_AS, owl::DIFFERENT_FROM].contains(&name);

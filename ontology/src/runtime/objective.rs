@@ -82,9 +82,9 @@ impl Runtime {
         self.apply(Delta { insert: Vec::new(), delete })
     }
 
-    /// Grounds an objective: selects the design, which replaces any other design, and removes the objective's
-    /// status. Returns the new grounding. In retract mode, existing measurements are linked to the grounding,
-    /// and if the objective is updatable, recovered components count as working (see
+    /// Grounds an objective: selects the design, which replaces any other design, and removes the objective's status.
+    /// Returns the new grounding. In retract mode, existing measurements of the design's estimated attributes are
+    /// linked to the grounding, and if the objective is updatable, recovered components count as working (see
     /// [`Runtime::note_recoveries`]). In latch mode, as in MROS, only later measurements are linked.
     ///
     /// # Errors

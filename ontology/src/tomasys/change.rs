@@ -102,9 +102,9 @@ pub fn clear_component_status(engine: &mut Engine, component: &str) -> Result<De
     Ok(replace(engine, property, subject, None))
 }
 
-/// Builds the update that states that a function design, given by its IRI or local name, is not
-/// realisable, independently of component states and measurements. If `realisable`, the update removes
-/// this statement.
+/// Builds the update that states that a function design, given by its IRI or local name, is not realisable,
+/// independently of component states and measurements. If `realisable`, the update removes the stated realisability of
+/// the design.
 ///
 /// # Errors
 /// Returns [`Error::Unknown`] if the knowledge base has no such design.

@@ -138,15 +138,15 @@ impl<'a> View<'a> {
         Self { called: (!called.is_empty()).then_some(called), ..self }
     }
 
-    /// Returns the named individuals of the class with this IRI, sorted by IRI.
+    /// Returns the individuals of the class with this IRI, including anonymous ones, sorted by IRI.
     pub fn individuals_of(&self, class_iri: &str) -> Vec<Individual> {
         let Some(class) = self.engine.symbols().find_name(class_iri) else { return Vec::new() };
         let members = self.engine.matching(class, &[None]).filter_map(|row| self.individual(row[0]));
         sorted(members)
     }
 
-    /// Returns the named individuals of all classes with this local name, in any namespace, sorted by
-    /// IRI.
+    /// Returns the individuals of all classes with this local name, in any namespace, including anonymous ones, sorted
+    /// by IRI.
     pub fn individuals_of_class_named(&self, class_name: &str) -> Vec<Individual> {
         let is_class = |&(predicate, arity): &(Symbol, usize)| {
             arity == 1 && self.name(predicate).is_some_and(|iri| local_name(iri) == class_name)

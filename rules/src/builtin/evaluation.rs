@@ -40,8 +40,8 @@ impl BuiltIn {
         }
     }
 
-    /// Returns `true` if an argument is a fresh value. A fresh value can be any value, so no built-in holds for it,
-    /// except a data range that contains all values.
+    /// Returns `true` if an argument is a fresh value, unless the built-in is a test of a data range. A fresh value can
+    /// be any value, so no other built-in holds for it.
     fn is_undecided<'l>(self, mut arguments: impl Iterator<Item = &'l Literal>) -> bool {
         !matches!(self, Self::DataRange | Self::OutsideDataRange) && arguments.any(Literal::is_fresh)
     }

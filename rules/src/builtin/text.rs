@@ -16,8 +16,8 @@ pub(super) fn test(built_in: BuiltIn, left: &Literal, right: &Literal) -> bool {
     }
 }
 
-/// Converts a text to lower case, each character independently of its neighbours. `str::to_lowercase` is
-/// different for a sigma at the end of a word.
+/// Converts a text to lower case for a comparison, each character independently of its neighbours. A final sigma
+/// becomes an ordinary one; `str::to_lowercase` distinguishes the two.
 fn folded(text: &str) -> String {
     let lower = text.chars().flat_map(char::to_lowercase);
     lower.map(|character| if character == 'ς' { 'σ' } else { character }).collect()

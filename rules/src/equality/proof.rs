@@ -125,8 +125,9 @@ impl Equality {
         }
     }
 
-    /// Converts the rows (facts about representatives) of a violated constraint to facts about names,
-    /// preferably stated facts. Adds the equalities between different names of one individual.
+    /// Converts the rows (facts about representatives) of a violated constraint to facts about names, preferably stated
+    /// facts. If the arguments of one fact are different names of one individual, adds the equality of these names.
+    /// Equalities between names in different facts are not added.
     pub fn witnesses(&self, engine: &Engine, rows: Vec<Fact>) -> Vec<Fact> {
         let mut facts = Vec::new();
         for row in rows {

@@ -21,7 +21,7 @@ use crate::symbol::Symbol;
 struct Update<'e> {
     engine: &'e mut Engine,
     equality: Equality,
-    /// Maps each row whose stated facts have changed since the last [`Update::flush`] to the stated
+    /// Maps each row whose stated facts may have changed since the last [`Update::flush`] to the stated
     /// facts that the row represents now.
     pending_rows: BTreeMap<Fact, BTreeSet<Fact>>,
     /// `true` if the class of a name that a rule mentions has changed since the last [`Update::flush`].
@@ -131,7 +131,7 @@ impl<'e> Update<'e> {
     }
 
     fn apply(&mut self, delta: &Delta) -> Result<Delta, (Error, Delta)> {
-        // A fact in both lists remains stated.
+        // A fact in both lists is stated afterwards.
         let inserted: FxHashSet<&Fact> = delta.insert.iter().collect();
         let (mut added, mut removed) = (Vec::new(), Vec::new());
         for fact in delta.delete.iter().filter(|fact| !inserted.contains(fact)) {

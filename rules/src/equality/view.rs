@@ -94,7 +94,7 @@ impl Equality {
         pairs.map(|pair| pair.arguments.clone()).filter(move |pair| fits(pair[0]))
     }
 
-    /// Returns the arguments of the facts that match a pattern. `None` in the pattern matches every name.
+    /// Returns the arguments of the facts that match a pattern. `None` in the pattern matches every symbol.
     pub fn matching(&self, engine: &Engine, predicate: Symbol, pattern: &[Option<Symbol>]) -> Vec<Arguments> {
         let normal: SmallVec<[Option<Symbol>; 4]> =
             pattern.iter().map(|wanted| wanted.map(|name| self.classes.find(name))).collect();

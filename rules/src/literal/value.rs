@@ -9,8 +9,8 @@ use super::binary;
 use super::decimal::Decimal;
 use super::temporal::{Duration, Moment};
 
-/// A literal. `Eq` and `Hash` compare values, not lexical forms, unless the datatype is unsupported or the literal is
-/// ill-typed.
+/// A literal. `Eq` and `Hash` compare values, not lexical forms, except for ill-typed literals and for
+/// [`Literal::Opaque`] ones that are not rational numbers.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 #[non_exhaustive]
 pub enum Literal {
@@ -126,8 +126,8 @@ impl Literal {
         }
     }
 
-    /// Returns a lexical form that depends only on the value, or the form as written for an unsupported datatype and
-    /// for an ill-typed literal.
+    /// Returns a lexical form that depends only on the value, or the form as written for an ill-typed literal and for
+    /// [`Literal::Opaque`] ones that are not rational numbers.
     pub fn lexical(&self) -> String {
         match self {
             Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
@@ -181,12 +181,12 @@ impl Literal {
         }
     }
 
-    /// Returns `true` if the value is a number.
+    /// Returns `true` for a decimal, a float or a double.
     pub fn is_numeric(&self) -> bool {
         matches!(self, Self::Decimal(_) | Self::Float(_) | Self::Double(_))
     }
 
-    /// Returns the exact value of a finite number; `None` for other literals.
+    /// Returns the exact value of a decimal, a finite float or a finite double; `None` for other literals.
     pub fn as_rational(&self) -> Option<BigRational> {
         match self {
             Self::Decimal(value) => Some(value.to_rational()),
@@ -196,7 +196,7 @@ impl Literal {
         }
     }
 
-    /// Returns the nearest double of a number; `None` for other literals.
+    /// Returns the nearest double of a decimal, float or double; `None` for other literals.
     pub fn as_f64(&self) -> Option<f64> {
         match self {
             Self::Decimal(value) => Some(value.to_f64()),

@@ -31,7 +31,7 @@ pub enum Fault {
         /// Rule that derives it.
         rule: RuleIdentity,
     },
-    /// A rule tests that two names differ, although they may be equal.
+    /// A rule tests whether two names differ, although they may be equal.
     #[error("a rule tests whether names differ that may denote one individual")]
     Difference,
     /// A rule, or an aggregate in it, has too many matches to enumerate.

@@ -38,7 +38,7 @@ pub(super) struct Matcher<'m> {
     pub facts: &'m Facts,
     pub names: &'m Names,
     pub equality: bool,
-    /// `true` if a rule required two names to differ although names may be equal. The given facts alone
+    /// `true` if a rule tested whether two names differ although names may be equal. The given facts alone
     /// then do not determine the result.
     pub compares_names: bool,
     pub too_many: bool,
@@ -178,7 +178,7 @@ impl Matcher<'_> {
     }
 
     /// Returns `true` if an atom that is not a relation atom holds. `sameAs` uses only the equalities in `names`,
-    /// i.e. those of earlier steps.
+    /// i.e. those of earlier steps, but within an aggregate it uses all equalities.
     pub fn holds(&mut self, atom: &Atom, rule: &Rule, values: &Values, names: &Names) -> bool {
         let position = rule.body.iter().position(|other| std::ptr::eq(other, atom));
         position.is_some_and(|position| self.holds_at(&rule.body, position, values, names))

@@ -9,8 +9,8 @@
 //! and no fact is missing. The last check is essential, since a rule may negate a missing fact. Contradictory
 //! facts are rejected, too.
 //!
-//! With equality, facts are compared by the first name of each class of equal names. A step may use only
-//! equalities of earlier steps.
+//! With equality, facts are compared by the first name of each class of equal names. The supports of a step may use
+//! only equalities of earlier steps.
 //!
 //! The checker uses nothing of the engine's store, plans, strata or records. It shares the data types of rules, facts
 //! and literals, and the evaluation of single built-ins and aggregates.
@@ -254,8 +254,8 @@ impl Replayer<'_> {
     }
 }
 
-/// Removes the condition that the two names in the head of an equality rule differ. Without the
-/// condition, the rule additionally derives only pairs of names that are already equal.
+/// Removes the condition that the two terms in the head of an equality rule differ. Without the condition, the rule
+/// additionally derives only pairs of terms that are already equal, and pairs of literals that may have the same value.
 fn without_guards(program: &Program) -> Program {
     let mut program = program.clone();
     for rule in program.rules.iter_mut().filter(|_| program.equality) {

@@ -16,7 +16,7 @@ pub(super) enum Token {
     Carets,
     Open,
     Close,
-    /// `{`, `|` and `}` enclose the atoms of an aggregate.
+    /// `{` and `}` enclose the content of an aggregate, and `|` separates its term from its atoms.
     OpenBrace,
     Bar,
     CloseBrace,

@@ -1,6 +1,6 @@
-//! Prints rules as text. [`super::parse_rules`] parses the text to the same rules, except for names of variables,
-//! labels and IRIs that the syntax cannot express. A relation atom of `owl:sameAs` or `owl:differentFrom` becomes a
-//! comparison. Built-ins defined by the caller also need `Syntax::built_ins`.
+//! Prints rules as text. [`super::parse_rules`] parses the text to rules with the same labels and atoms, except for
+//! names of variables, labels and IRIs that the syntax cannot express. A relation atom of `owl:sameAs` or
+//! `owl:differentFrom` becomes a comparison. Built-ins defined by the caller also need `Syntax::built_ins`.
 
 use std::fmt::Write;
 
