@@ -45,8 +45,8 @@ pub struct Need {
     pub number: u32,
     /// The variables of the pattern, as in [`Potential::pattern`].
     pub pattern: Vec<u32>,
-    /// The bound for each combination of values, ordered as in [`Potential::values`]. `null` means that no goal
-    /// state is reachable.
+    /// The bound for each combination of values, ordered as in [`Potential::values`]. 0 means that the number is
+    /// not restricted, and `null` that no goal state is reachable.
     pub values: Vec<Option<Integer>>,
 }
 

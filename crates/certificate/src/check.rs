@@ -67,7 +67,7 @@ pub enum Fault {
     #[error("no label covers the initial state")]
     Initial,
     /// A label (state of the proof), given by its position in the argument, is a goal state with a
-    /// smaller cost than claimed.
+    /// smaller cost than claimed, or any goal state if the claim is that there is no plan.
     #[error("label {0} is a goal state, and cheaper than claimed")]
     Goal(usize),
     /// A successor of a label (state of the proof) is neither covered by a label nor pruned by a

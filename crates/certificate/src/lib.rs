@@ -5,10 +5,10 @@
 //! numbers (equal numbers, if larger numbers may hurt). *Potentials* are lower bounds on the remaining cost, as
 //! tables over a few variables. *Needs* are lower bounds on numbers that are required to reach the goal.
 //!
-//! Three conditions are checked. The initial state is covered or pruned (by a potential or a need), no label is
-//! a goal state cheaper than the claim, and each successor of a label is covered or pruned. Then no plan of any
-//! length is cheaper than the claim, by induction over its steps. A claim without a cost states that the task
-//! has no plan.
+//! The potentials and needs are checked to be lower bounds. Three further conditions are checked. The initial
+//! state is covered or pruned (by a potential or a need), no label is a goal state cheaper than the claim, and
+//! each successor of a label is covered or pruned. Then no plan of any length is cheaper than the claim, by
+//! induction over its steps. A claim without a cost states that the task has no plan.
 //!
 //! [`faithful()`] checks that a ground task is faithful to its PDDL files, without grounding them.
 //! [`check_refutation`] checks an additional proof for small tasks: a formula, its refutation, and a bound on

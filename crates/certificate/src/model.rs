@@ -182,7 +182,8 @@ pub struct Layer {
 pub struct Objective {
     /// Factor by which costs are greater than the metric; it makes them integers.
     pub scale: Integer,
-    /// The constant part of the metric, in cost units.
+    /// Constant that is added to the sum of the operator costs, in cost units: the value of the metric in
+    /// the initial state, negated if the metric is maximised.
     pub offset: Integer,
     /// Whether the metric is maximised; costs then have the opposite sign.
     pub maximize: bool,

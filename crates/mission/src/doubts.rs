@@ -102,8 +102,8 @@ impl Mission {
         doubts
     }
 
-    /// Warns about numeric functions that are used but have neither an initial value nor an `assign` effect.
-    /// `total-cost` and sums over designs are exempt.
+    /// Warns about numeric functions that the domain uses, but that have neither an initial value nor an `assign`
+    /// effect. `total-cost` and sums over designs are exempt.
     fn functions_without_value(&self) -> Vec<Message> {
         if self.domain.functions.is_empty() {
             return Vec::new();

@@ -8,7 +8,7 @@ use crate::message::Message;
 
 impl Mission {
     /// Returns an error (M310) for each timed initial literal and for each constraint whose satisfaction by the rest
-    /// of a plan depends on earlier states. The adaptation loop plans from the present state and does not store
+    /// of a plan can depend on earlier states. The adaptation loop plans from the present state and does not store
     /// earlier states.
     pub fn depends_on_past(&self) -> Vec<Message> {
         let error = |source: &Source, span: Span, text: &str| {
@@ -33,8 +33,9 @@ impl Mission {
     }
 }
 
-/// Returns `true` unless the constraint is a goal, or a mandatory condition on all states. A preference for a condition
-/// on all states may be violated already.
+/// Returns `true` if the satisfaction of the constraint by the rest of a plan can depend on earlier states. It cannot if
+/// the constraint consists of `at end` and, unless it is a preference, of `always`. A preference with `always` may be
+/// violated already.
 fn constrains_past(constraint: &Constraint) -> bool {
     fn is_allowed(trajectory: &Trajectory, is_mandatory: bool) -> bool {
         match trajectory {

@@ -49,9 +49,9 @@ impl Mission {
     /// Joins a domain and a problem with a knowledge base, if there is one.
     ///
     /// # Errors
-    /// Errors of the knowledge base, files of another kind, and syntax errors of the domain and the problem.
-    /// Without such errors: errors of `[bindings.names]`, required functions without a common design, and errors of
-    /// co-adaptation. Symbols and types of PDDL are not checked; see [`Mission::filled`].
+    /// Errors of the knowledge base, unreadable files, files of another kind, and syntax errors of the domain and the
+    /// problem. Without such errors: errors of `[bindings.names]`, required functions without a common design, and
+    /// errors of co-adaptation. Symbols and types of PDDL are not checked; see [`Mission::filled`].
     pub fn new(
         name: &str,
         knowledge: Option<Result<Knowledge, Errors>>,
@@ -139,8 +139,8 @@ impl Mission {
         self.warnings.iter().chain(self.knowledge.iter().flat_map(Knowledge::warnings))
     }
 
-    /// Replaces the warnings of the mission by the result of `change`. The caller can thus add
-    /// context that this crate does not have.
+    /// Replaces the warnings of the mission, without those of the knowledge base, by the result of
+    /// `change`. The caller can thus add context that this crate does not have.
     pub fn change_warnings(&mut self, change: impl FnOnce(Vec<Message>) -> Vec<Message>) {
         self.warnings = change(std::mem::take(&mut self.warnings));
     }
@@ -270,7 +270,8 @@ impl Mission {
     }
 
     /// Returns the domain. A plain domain (without a type of designs) is returned in its explicit
-    /// form, with design parameters.
+    /// form, with design parameters. A domain in PLANTA's form is returned with the declarations of
+    /// the knowledge base.
     pub fn domain(&self) -> &Domain {
         &self.domain
     }

@@ -3,8 +3,8 @@
 //!
 //! The PDDL problem receives its functions, its designs with their availability, its actions and the values of quality
 //! attributes from the knowledge base, according to the bindings of the mission. The crate also contains the messages
-//! and the file access of all programs. It contains no planner, so that the certificate checker fills a problem with
-//! the same code as the planner.
+//! of all programs, and functions to read and write files. It contains no planner, so that the certificate checker
+//! fills a problem with the same code as the planner.
 //!
 #![doc = include_str!("../README.md")]
 

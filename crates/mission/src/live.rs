@@ -209,7 +209,7 @@ impl Mission {
     /// Parses a goal and checks it against the domain and all objects.
     ///
     /// # Errors
-    /// All syntax and type errors of the goal.
+    /// The syntax errors of the goal. Without such errors: its type errors.
     pub fn goal(&self, text: &str) -> Result<Condition, Errors> {
         let text = format!("(define (problem goal) (:domain {}) (:goal {text}))", self.domain.name.name);
         let source = Source::new("goal", text);

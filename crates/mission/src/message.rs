@@ -144,7 +144,7 @@ impl Message {
         self
     }
 
-    /// Adds a hint that describes a remedy.
+    /// Sets the hint that describes a remedy.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.0.help = Some(help.into());

@@ -18,8 +18,8 @@ impl Mission {
     ///   replaces all facts that differ in the last argument only.
     ///
     /// # Errors
-    /// No case matches, a value is not a decimal number, an attribute is only estimated, inference exceeds its
-    /// limits, or the knowledge base decides on the availability of the design.
+    /// No case matches, a value is not a decimal number, measured values of the attribute have no effect, inference
+    /// exceeds its limits, or the knowledge base decides on the availability of the design.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), Message> {
         self.current.take();
         let value = value.trim();

@@ -130,7 +130,7 @@ pub struct Domain {
     pub types: Vec<TypedName>,
     /// `:constants`.
     pub constants: Vec<TypedName>,
-    /// `:predicates`.
+    /// Predicates of `:predicates`, and those that represent object fluents.
     pub predicates: Vec<Declaration>,
     /// Numeric functions of `:functions`.
     pub functions: Vec<Declaration>,
@@ -171,7 +171,7 @@ pub struct Action {
     pub identifier: Identifier,
     /// Typed parameters.
     pub parameters: Vec<TypedName>,
-    /// Conditions and effects.
+    /// Conditions, effects and duration.
     pub body: ActionBody,
     /// Preferences among the conditions.
     pub preferences: Vec<Preference>,

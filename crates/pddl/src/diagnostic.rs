@@ -41,7 +41,7 @@ impl Severity {
 /// Error or warning at a position of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// Stable code `P1xx`.
+    /// Stable code, for example `P121`.
     pub code: &'static str,
     /// Severity: error or warning.
     pub severity: Severity,

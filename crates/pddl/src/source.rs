@@ -62,7 +62,7 @@ impl Source {
         &self.text
     }
 
-    /// Text at `span`; empty if the span does not belong to this text.
+    /// Text at `span`, which must be a span of this text; empty if it exceeds the text.
     pub fn slice(&self, span: Span) -> &str {
         self.text.get(span.start as usize..span.end as usize).unwrap_or("")
     }

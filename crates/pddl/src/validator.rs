@@ -44,8 +44,8 @@ impl<'a> Validator<'a> {
         Self { options, ..self }
     }
 
-    /// Allows actions to overlap, by the rules of PDDL 2.1. Interfering happenings must be at least
-    /// `separation` apart, in the domain's time unit.
+    /// Allows actions to overlap, by the rules of PDDL 2.1, and resets the other options. Interfering happenings
+    /// must be at least `separation` apart, in the domain's time unit.
     #[must_use]
     pub fn concurrent(self, separation: BigRational) -> Self {
         self.options(Options::default().with_concurrent(true).with_tolerance(separation))

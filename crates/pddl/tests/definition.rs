@@ -1,5 +1,5 @@
-//! Tests of the definition of a plan (`validate/definition.md`). For each rule there are plans on both sides
-//! of its boundary, in sequential and in concurrent execution.
+//! Tests of the definition of a plan (`validate/definition.md`), with plans on both sides of the boundaries of
+//! its rules.
 
 use metaplan_pddl::validate::{Options, PlanStep, PlanText, advance, validate};
 use metaplan_pddl::{Source, read};
@@ -220,7 +220,7 @@ fn an_action_of_duration_zero_is_one_happening() {
         ("(at end (q))", "(at start (p)) (at end (g))", "at_end"),
         ("(at end (p))", "(at start (p)) (at end (g))", "at_end"),
         ("(at end (r))", "(at start (p)) (at end (g))", "valid"),
-        // The end reads an atom that the start writes, although the atom held before.
+        // The end reads an atom that the start writes, or vice versa, although the atom held before.
         ("(at end (r))", "(at start (r)) (at end (g))", "interference"),
         ("(at start (r))", "(at end (not (r))) (at end (g))", "interference"),
         // The start adds the atom that the end deletes, or vice versa; both add it; both delete it.
@@ -334,8 +334,8 @@ fn an_instance_may_overlap_with_itself() {
         CONCURRENTLY,
         &[("0: (a) [2]\n0.5: (a) [2]", "at_start"), ("0: (a) [2]\n1: (b) [1]\n1.001: (a) [2]", "over_all")],
     );
-    // The ends of two occurrences must be separated like any happenings: assigning a number twice is not
-    // simultaneous.
+    // The ends of two occurrences that assign the same number must be separated, like any interfering
+    // happenings.
     for effect in ["(assign (x) 1)", "(assign (x) (+ (x) 1))"] {
         let a = durative("a", "2", "", &format!("(at end {effect})"));
         task(&[a], "", "").check(

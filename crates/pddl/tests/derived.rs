@@ -238,7 +238,7 @@ proptest! {
     }
 }
 
-/// Returns a task with a derived predicate `p` along a chain of `length` objects. `axiom` is the condition of
+/// Returns a task with a derived predicate `p` along a chain of `length` links. `axiom` is the condition of
 /// `p`.
 fn chain(length: usize, axiom: &str) -> (Domain, Problem) {
     let domain = format!(

@@ -147,8 +147,8 @@ fn variable(of_all: bool, depth: usize) -> String {
 }
 
 impl Effect {
-    /// Applies the effect to `after`, with conditions and values evaluated in `before`. Returns `None` if a
-    /// value is undefined.
+    /// Applies the effect to `after`, with conditions evaluated in `before`. Additions are only recorded in
+    /// `added`. Returns `None` if a value is undefined.
     fn apply(
         &self,
         before: &State,

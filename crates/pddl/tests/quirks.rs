@@ -1,8 +1,8 @@
 //! Quirks of real files are accepted, with a warning where a file deviates from the standard. Only undeclared
 //! names are errors.
 //!
-//! Two domains in the repository contain the quirks. A larger matrix of minimal pairs and the generated
-//! missions come from scripts outside of the project.
+//! Two domains in this file contain the quirks. A larger matrix of minimal pairs and the generated missions
+//! come from scripts outside of the project.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -78,7 +78,7 @@ fn types_decide_which_objects_fit() {
         ("dock", "(either machine place)", true),
         ("both", "place", true),
         ("both", "machine", true),
-        // An object without a type is accepted with a warning.
+        // An object of type `object` is accepted with a warning.
         ("object", "place", true),
         // An undeclared type restricts nothing.
         ("robot", "ghost", true),

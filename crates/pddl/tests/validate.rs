@@ -1,4 +1,4 @@
-//! Tests of the validator: valid plans, and invalid plans for each kind of violation.
+//! Tests of the validator: valid plans, and invalid plans for most kinds of violations.
 
 use num_rational::BigRational;
 
@@ -174,8 +174,7 @@ fn sequential_plans_of_a_temporal_task_are_judged() {
                 "valid time=16/3 metric=68/3 (level)=20/3",
             ),
             ("0: (prepare)\n0: (work) [3.333]\n3.3: (light) [2]", "3 overlap"),
-            // Daylight ends before the end of the action; in the last case, before the end of a condition
-            // over all.
+            // Daylight ends at 20.
             ("0: (prepare)\n18: (work) [3.333]", "2 at_end (day)"),
             ("0: (prepare)\n16.666: (work) [3.333]", "valid time=10/3 metric=50/3 (level)=20/3"),
             // The action reads `day` at its end, so the event must not be at the same time.

@@ -59,7 +59,7 @@ pub enum Error {
         /// Number of reached states.
         states: usize,
     },
-    /// A policy does not match the model.
+    /// The text of a policy is malformed, or a policy does not match the model.
     #[error("{0}")]
     Policy(String),
 }

@@ -19,8 +19,9 @@ pub(crate) fn is_whole(value: f64) -> bool {
     value.fract() == 0.0 && value < WHOLE
 }
 
-/// Adds two rewards. Integers below 4·10^15 count as exact in doubles. So if the sum of other rewards rounds to such an
-/// integer, an adjacent double is returned instead.
+/// Adds two rewards. A double that is an integer below 4·10^15 counts as exact. The sum must therefore not be such a
+/// double unless both rewards are: if it is, the next greater double is returned instead. In exact arithmetic, returns
+/// the sum.
 pub(crate) fn sum_of_rewards<N: Number>(left: &N, right: &N) -> N {
     let sum = left.plus(right);
     let [left, right, double] = [left, right, &sum].map(Number::to_f64);
@@ -47,8 +48,8 @@ pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     fn zero() -> Self;
     /// One.
     fn one() -> Self;
-    /// Converts a rational to this type. The result is the nearest double, but a rational that is not an
-    /// integer never becomes an integral double below 4·10^15: instead of the integer, an adjacent double is
+    /// Converts a rational to this type. In doubles, the result is the nearest double, but a rational that is not
+    /// an integer never becomes an integral double below 4·10^15: instead of the integer, an adjacent double is
     /// returned.
     fn from_rational(value: &BigRational) -> Self;
     /// Converts a double to this type; infinities and NaN become zero.

@@ -250,8 +250,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(done)
     }
 
-    /// Minimises the first loss under an upper limit on the second loss. Returns `None` if no
-    /// policy satisfies the limit. With more than 2,000 vertices, the values may be above the minimum, also in exact
+    /// Minimises the first loss under an upper limit on the second loss. Returns `None` if no policy with finite
+    /// losses satisfies the limit. With more than 2,000 vertices, the values may be above the minimum, also in exact
     /// arithmetic.
     ///
     /// # Errors

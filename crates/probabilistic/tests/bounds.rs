@@ -129,7 +129,7 @@ fn nearly_integral_rewards_are_enclosed() {
     assert_eq!([whole.lower, whole.upper].map(f64::to_bits), [7.0, 7.0].map(f64::to_bits));
 }
 
-/// The doubles next to 1/2 are exact, and so is their sum, but not the sum of the rewards.
+/// In doubles the rewards are 1/2 and their sums are exact, but the true sums are smaller.
 #[test]
 fn rewards_with_an_integral_sum_in_doubles_are_enclosed() {
     let half = "0.49999999999999999999";

@@ -65,7 +65,7 @@ fn ranges_may_span_the_integer_type() {
         ("0..9223372036854775808", "0", "[] true -> (s'=1);", "s>0", "Q105 2:16"),
         ("0..greatest+1", "0", "[] true -> (s'=1);", "s>0", "Q303 2:16"),
         ("0..9", "pow(2,9223372036854775807)", "[] true -> (s'=1);", "s>0", "Q303 2:24"),
-        // Powers of 0, 1 and -1 fit into the range for every exponent.
+        // Powers of 0, 1 and -1 are small even for huge exponents.
         ("-1..1", "pow(-1,greatest)", "[] s<0 -> (s'=pow(1,greatest));", "s=1", "1"),
         ("-1..1", "pow(-1,greatest-1)", "[] s>0 -> (s'=pow(0,greatest));", "s=0", "1"),
         ("0..1", "0", "[] s=0 -> (s'=pow(0,0));", "s=1", "1"),

@@ -344,8 +344,8 @@ fn unsupported_properties_do_not_affect_the_others() {
     );
 }
 
-/// The expanded forms of the properties are checked in the tests above. A label of the model takes
-/// precedence over a property with the same name.
+/// The values follow from those in the tests above. A label of the model takes precedence over a property
+/// with the same name.
 #[test]
 fn named_properties_are_expanded() {
     let text = "
@@ -390,7 +390,7 @@ fn named_properties_are_expanded() {
     }
 }
 
-/// Values by hand: the first command waits, `a` leads to the first target, and `b` to each target or to neither.
+/// Values by hand: the first command waits, `a` leads to the first target, and `b` to the second one or to neither.
 #[test]
 fn fronts_of_probabilities_do_not_wait_for_ever() {
     let model = "mdp module m s:[0..3] init 0;

@@ -236,7 +236,7 @@ proptest! {
     }
 }
 
-/// A random walk on a square. Elimination would have much fill-in in two dimensions, so interval
+/// A random walk on a torus. Elimination would have much fill-in in two dimensions, so interval
 /// iteration is used.
 #[test]
 #[ignore = "20 s in release, minutes in debug: a component of 90,000 states"]

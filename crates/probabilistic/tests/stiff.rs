@@ -126,8 +126,8 @@ fn the_better_choice_in_a_stiff_process_is_found() {
     }
 }
 
-/// A gambler starts with 1, wins each round with probability 2/5, and stops at 1,000. The
-/// probability of reaching 1,000 is (3/2 − 1) / ((3/2)^1000 − 1), about 4.5·10^−177.
+/// A gambler starts with 1, wins each round with probability 2/5, and stops at 0 or 1,000. The
+/// probability of reaching 1,000 is (3/2 − 1) / ((3/2)^1000 − 1), about 4.05·10^−177.
 #[test]
 fn bounds_of_tiny_values_are_relative() {
     let model = "dtmc module m x:[0..1000] init 1;

@@ -50,7 +50,8 @@ pub struct Inputs<'i> {
 }
 
 /// Encodes "some plan of at most T steps is cheaper than the claim". T is chosen such that no plan of more than
-/// T steps is cheaper. Returns the formula and T. The claim is interpreted as in [`crate::check`].
+/// T steps is cheaper if the potentials are lower bounds, which is not checked. Returns the formula and T. The
+/// claim is interpreted as in [`crate::check`].
 ///
 /// # Errors
 /// A malformed document, a missing claim, an unsupported construct, no provable bound on the number of steps,

@@ -20,8 +20,7 @@ use pddl::ast::{Atom, Condition, Derived, Name, Term, TypedName};
 /// Upper limit on the number of derived atoms, and on the number of partial bindings of one rule.
 const ATOM_LIMIT: usize = 50_000;
 
-/// Upper limit on the number of conjuncts, not counting the atom, that are used to restrict the candidate objects of
-/// variables.
+/// Upper limit on the number of conjuncts that are used to restrict the candidate objects of variables.
 const CONJUNCT_LIMIT: usize = 64;
 
 struct Occurrence<'w> {
@@ -217,9 +216,10 @@ impl Occurrence<'_> {
 }
 
 impl<'r> Reader<'r> {
-    /// Returns `false` only if a condition holds in no state of the witness in which at most the
-    /// derived atoms of `axioms.bound` hold. Implications, universal conditions and comparisons are
-    /// assumed to be possible. So are negations, except those of equalities and of basic atoms.
+    /// Returns `true` if a condition may hold in a state of the witness, provided that no derived
+    /// atoms hold except those of `axioms.bound`; `false` means that it certainly does not.
+    /// Implications, universal conditions and comparisons are assumed to be possible. So are
+    /// negations, except those of equalities and of basic atoms.
     fn is_possible(&mut self, condition: &'r Condition) -> Result<bool, Cause> {
         self.count()?;
         match condition {

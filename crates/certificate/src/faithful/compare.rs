@@ -244,8 +244,8 @@ impl<'c> Comparison<'c> {
         self.find(&waits, case, &instance)
     }
 
-    /// Checks that one of the candidate operators simulates the case in every state in which it can
-    /// be executed. Fails if this is not proved after [`SPLIT_LIMIT`] partial states.
+    /// Checks that in every state in which the case can be executed, one of the candidate operators
+    /// simulates it. Fails if this is not proved after [`SPLIT_LIMIT`] partial states.
     fn find(&self, candidates: &[(&Operator, Vec<u32>)], case: &Case, instance: &Instance<'_>) -> Result<()> {
         let structure = &self.task.names.structure;
         let conditions: Vec<Formula> = candidates
@@ -336,7 +336,7 @@ impl<'c> Comparison<'c> {
 
     /// Returns the minimal increase of the metric by a case. Without a metric, returns the minimal
     /// duration if plans are measured by time, otherwise 1. Fails if the increase depends on the
-    /// state.
+    /// state or has no minimum.
     fn cost(&self, case: &Case) -> Result<BigRational> {
         let one = BigRational::one();
         let time = |factor: &BigRational| match &case.length {

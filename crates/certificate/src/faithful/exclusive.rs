@@ -99,7 +99,7 @@ impl Move {
     ///
     /// # Errors
     /// The atoms that the case requires and deletes: if one of them is added to the group, the
-    /// check may succeed. Empty if there is no such atom.
+    /// check may succeed. Empty if no larger group passes the check.
     pub(super) fn keeps(&self, group: &Group, may_hold: &dyn Fn(&Key) -> bool) -> Result<(), Vec<Key>> {
         let mut added = self.adds.iter().filter(|key| group.contains(*key));
         let Some(key) = added.next() else { return Ok(()) };

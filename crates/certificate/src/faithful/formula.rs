@@ -271,7 +271,7 @@ fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, stric
 }
 
 /// Returns a common divisor of all values that an expression without its constant term has in any state.
-/// Returns `None` if a fluent has no known factor that makes it an integer.
+/// Returns `None` if there is no fluent, or if a fluent has no known factor that makes it an integer.
 fn unit(structure: &Structure, linear: &Linear) -> Option<BigRational> {
     let mut unit: Option<BigRational> = None;
     for (key, factor) in &linear.factors {

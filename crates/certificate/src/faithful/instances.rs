@@ -1,5 +1,5 @@
-//! Enumerates the action instances whose static conditions hold: joins the static atoms of the
-//! condition, then adds all objects of the right types for the remaining parameters.
+//! Enumerates the action instances for which the static atoms among the conjuncts of the condition
+//! hold: joins these atoms, then adds all objects of the right types for the other parameters.
 
 use rustc_hash::FxHashMap;
 

@@ -21,7 +21,7 @@
 //! predicates, including recursive ones that are variables of the task with equivalent rules;
 //! instantaneous and durative actions, executed one after another; timed initial literals
 //! (`timeline`); metrics of both directions. Any other construct yields [`Cause::Unsupported`].
-//! The check shares only the syntax tree with the grounder.
+//! The check shares only the syntax tree and the type hierarchy with the grounder.
 //!
 //! [1] R. Milner: An algebraic definition of simulation between programs, IJCAI 1971.
 

@@ -1,5 +1,5 @@
 //! Timed initial literals when actions are executed one after another, by the definition in
-//! `validate/definition.md`.
+//! `crates/pddl/src/validate/definition.md`.
 //!
 //! All literals of the same time form an event. Events divide time into phases: phase 0 begins with the plan,
 //! and phase i with event i (counted from 1). The effect of events on an action depends on its *passage*, i.e.

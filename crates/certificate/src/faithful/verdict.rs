@@ -16,14 +16,15 @@ pub enum Faithful {
         /// time.
         timed: bool,
     },
-    /// The task is not faithful; the first difference found.
+    /// The task is rejected because of the first difference found. The difference may concern only
+    /// unreachable states of the witness.
     No(Difference),
     /// The check cannot decide whether the task is faithful.
     Undecided(Cause),
 }
 
-/// A difference that refutes the task or the witness (an over-approximation of the reachable
-/// states).
+/// A difference for which the task or the witness (an over-approximation of the reachable states)
+/// is rejected.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Difference {

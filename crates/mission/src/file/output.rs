@@ -146,8 +146,8 @@ fn overwrite(mut file: File, source: &Path) -> io::Result<()> {
     written
 }
 
-/// Resolves all symbolic links of a path; the target need not exist. The returned flag is `true` if one of the links is
-/// in `/proc`, as the file descriptor `/dev/fd/3` is.
+/// Follows a path as long as it is a symbolic link; the target need not exist. The returned flag is `true` if one of the
+/// links is in `/proc`, as the file descriptor `/dev/fd/3` is.
 fn followed(path: &Path) -> io::Result<(PathBuf, bool)> {
     let (mut path, mut is_descriptor) = (path.to_owned(), false);
     for _ in 0..=MAX_LINKS {

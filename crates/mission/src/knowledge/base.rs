@@ -50,13 +50,13 @@ pub struct Knowledge {
     stated: Option<Arc<[Fact]>>,
 }
 
-/// A violation of an axiom or rule by facts of the knowledge base.
+/// A contradiction in the knowledge base: facts that violate an axiom or rule, or an invalid literal.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Contradiction {
-    /// Violated axiom or rule.
+    /// Violated axiom or rule, or a sentence about an invalid or unequal literal.
     pub violated: String,
-    /// Facts that together violate the axiom or rule.
+    /// Facts that together cause the contradiction.
     pub facts: Vec<String>,
 }
 
@@ -64,7 +64,7 @@ impl Knowledge {
     /// Reads documents and rules, with OWL's semantics of equality between individuals.
     ///
     /// # Errors
-    /// All errors of the sources.
+    /// All errors of the sources. Without such errors: inference exceeds its limits.
     pub fn read(sources: &Sources) -> Result<Self, Errors> {
         Self::read_as(sources, Equality::Owl)
     }
@@ -72,7 +72,7 @@ impl Knowledge {
     /// Like [`Knowledge::read`], but with the given semantics of equality between individuals.
     ///
     /// # Errors
-    /// All errors of the sources.
+    /// As for [`Knowledge::read`].
     pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Errors> {
         Self::of_stated(sources, Stated::read(sources, equality)?)
     }
@@ -82,7 +82,7 @@ impl Knowledge {
     /// assumes unique names.
     ///
     /// # Errors
-    /// All errors of the sources.
+    /// As for [`Knowledge::read`].
     pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Errors> {
         Self::of_stated(sources, Stated::read_for(sources, domain)?)
     }
@@ -468,9 +468,9 @@ impl Knowledge {
     }
 
     /// Adds the assertions, axioms and rules of the documents in `asserted` and removes those of
-    /// the documents in `retracted`. The result equals the knowledge read from the combined
-    /// document. A statement that occurs in both lists is kept. Imports of these documents are not
-    /// followed. Returns the warnings, which are also added to [`Knowledge::warnings`].
+    /// the documents in `retracted`, except declarations. Reports of the robot stay. A statement that
+    /// occurs in both lists is kept. Imports of these documents are not followed. Returns the
+    /// warnings, which are also added to [`Knowledge::warnings`].
     ///
     /// # Errors
     /// All errors of the documents, a retracted anonymous individual, or exceeded limits of
@@ -500,8 +500,9 @@ impl Knowledge {
         Ok(warnings)
     }
 
-    /// Returns the inferred facts in an order that depends only on the sources. If an individual
-    /// has more than 32 equal names, only the pairs with its first name are listed.
+    /// Returns the inferred facts in an order that depends only on the sources and on the later
+    /// updates. If an individual has more than 32 equal names, only the pairs with its first name are
+    /// listed.
     pub fn inferred(&self) -> Vec<Fact> {
         self.engine().inferred_in_brief(MANY_NAMES)
     }

@@ -13,15 +13,15 @@ use crate::knowledge::waiting::{Fault, RobotReport, Waiting, fault};
 use crate::message::Message;
 
 impl Knowledge {
-    /// Returns the reason why the consequences of pending reports are unknown. `None` unless inference has failed.
-    /// While the consequences are unknown, no design counts as available.
+    /// Returns the reason why the consequences of pending reports or objectives are unknown. `None` unless inference
+    /// has failed. While the consequences are unknown, no design counts as available.
     pub fn fault(&self) -> Option<&Fault> {
         self.waiting.fault.as_ref()
     }
 
-    /// Applies a report about a component, attribute or design, together with pending reports. Returns the facts that
-    /// start or cease to hold, including conclusions. If inference fails, the report is kept as pending, and the
-    /// returned change is empty.
+    /// Applies a report about a component, attribute or design, together with pending reports, then sets the pending
+    /// objectives. Returns the facts that start or cease to hold by the reports, including conclusions. If inference
+    /// fails, the report is kept as pending, and the returned change is empty.
     ///
     /// # Errors
     /// There is no such component, attribute or design. Also if a pending objective has an unknown function or design;

@@ -75,8 +75,8 @@ pub(super) fn is_read(engine: &Engine, reads: &[Vec<ValueRead>], attribute: &str
     })
 }
 
-/// Returns `true` if the rule of an axiom concludes more than that a value exists: it has several conditions, or
-/// copies the value. Domains, ranges and equalities do not.
+/// Returns `true` if the rule of an axiom concludes more than that a value exists. It then has several conditions or
+/// concludes a property. Conclusions about properties of values or with names of the W3C do not count.
 fn concludes_more(symbols: &Symbols, rule: &Rule) -> bool {
     rule.head.iter().any(|atom| {
         let Atom::Relation { predicate, arguments } = atom else { return false };

@@ -1,5 +1,5 @@
 //! Translates OWL axioms to derived predicates, for the kinds of axioms that `OWLToPDDL`
-//! translates. Other axioms are reported as left out.
+//! translates. Most other axioms are reported as left out.
 
 use std::collections::BTreeMap;
 
@@ -125,7 +125,7 @@ impl Terms {
                 self.functional.insert(plain);
             }
             // Assertions are translated to initial facts elsewhere. PDDL cannot express the
-            // datatype of a literal.
+            // datatype of a literal, and objects with different names are different in PDDL.
             Axiom::ClassAssertion(ClassExpression::Class(_), _)
             | Axiom::ObjectPropertyAssertion(ObjectPropertyExpression::Property(_), ..)
             | Axiom::DataPropertyAssertion(..)

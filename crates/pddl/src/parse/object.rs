@@ -2,7 +2,8 @@
 //!
 //! `(place-of ?x - tool) - place` becomes a predicate with one more argument: the value. The predicate holds
 //! for at most one value.
-//! - An object-fluent term in a condition becomes a variable that `exists` binds.
+//! - A condition `(= (place-of ?x) ?y)` becomes an atom. Another object-fluent term in a condition becomes a
+//!   variable that `exists` binds.
 //! - An object-fluent term in an effect becomes a variable that `forall` binds; `when` restricts the effect to the
 //!   value of the term.
 //! - An assignment adds the atom with the new value and deletes the atoms with all values. Additions override
@@ -78,7 +79,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Returns a variable whose name does not occur in the text.
+    /// Returns a variable whose name no variable of the text has.
     #[expect(clippy::arithmetic_side_effects, reason = "a file has fewer terms than bytes")]
     pub(super) fn new_variable(&mut self, span: Span) -> Identifier {
         if self.objects.prefix.is_none() {
@@ -277,8 +278,9 @@ impl Parser<'_> {
         Mark { needs: self.objects.needs.len(), assigned: self.objects.assigned.len() }
     }
 
-    /// Adds an enclosing `forall` to all effects parsed since `mark`. Their needs (conditions on
-    /// the state) are quantified over `variables`, and their assignments get these variables.
+    /// Records that a `forall` over `variables` encloses all effects parsed since `mark`. Their needs (conditions on
+    /// the state) are quantified over `variables`, and their assignments get these variables. The caller wraps the
+    /// effects themselves.
     pub(super) fn effects_below(&mut self, mark: Mark, variables: &[TypedName]) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));
@@ -289,8 +291,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Adds an enclosing `when` to all effects parsed since `mark`. Their needs (conditions on the
-    /// state) then depend on `condition`, and so do their assignments.
+    /// Records that a `when` encloses all effects parsed since `mark`. Their needs (conditions on the state) then
+    /// depend on `condition`, and so do their assignments. The caller wraps the effects themselves.
     pub(super) fn effects_when(&mut self, mark: Mark, condition: &Condition) {
         for (_, need) in &mut self.objects.needs[mark.needs..] {
             let inner = std::mem::replace(need, Condition::And(Vec::new()));

@@ -28,7 +28,7 @@ pub struct Advance {
     pub added: Vec<Atom>,
     /// Facts that become false, sorted by their text. Derived facts are not included.
     pub deleted: Vec<Atom>,
-    /// Numeric functions that the step changes, sorted.
+    /// Numeric functions on which the step has an effect, sorted. A value can remain equal.
     pub values: Vec<ValueChange>,
     /// Duration of the step, in the domain's time unit.
     pub duration: BigRational,
@@ -56,9 +56,8 @@ pub struct ValueChange {
 /// neither stated nor determined is chosen (see [`Options::chosen_durations`]).
 ///
 /// # Errors
-/// Returns the violation that prevents the step. With `forced`, conditions and interference are not checked;
-/// unknown actions, durations that violate a constraint at start, and undefined or conflicting effects remain
-/// errors.
+/// Returns the violation that prevents the step. With `forced`, conditions, duration constraints at end, and
+/// interference are not checked; for example, unknown actions and conflicting effects remain errors.
 pub fn advance(
     domain: &Domain,
     problem: &Problem,

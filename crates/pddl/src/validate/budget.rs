@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::fmt;
 
-/// Number of loop steps between two calls of the caller's stop function.
+/// Maximum number of loop steps between two calls of the caller's stop function.
 const STRIDE: u32 = 256;
 
 /// Error: the caller stopped the validation, so there is no verdict.

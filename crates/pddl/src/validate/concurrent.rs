@@ -15,7 +15,7 @@ use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 use crate::number::show_number;
 
-/// An earlier happening whose distance from the current time is less than the separation.
+/// A checked happening that takes place now, or earlier by less than the separation.
 struct Recent<'e, 'p> {
     /// Step of the action; `None` for events (timed initial literals).
     step: Option<&'e Step<'p>>,

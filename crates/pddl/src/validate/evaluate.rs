@@ -53,8 +53,8 @@ impl<'p> Bindings<'p> {
     }
 }
 
-/// Maximum number of bits of a numerator or denominator. Repeated squaring in a malformed plan would
-/// otherwise exhaust memory.
+/// Maximum number of bits of a numerator or denominator in a result. Repeated squaring would otherwise exhaust
+/// memory.
 const BITS_LIMIT: u64 = 100_000;
 
 #[derive(Debug, Clone, Copy)]
@@ -234,7 +234,7 @@ pub(super) fn metric(world: &World<'_>, state: &State, total_time: &BigRational)
 
 impl<'p> World<'p> {
     /// Calls `visit` for each assignment of objects to `variables`, until `visit` returns `false` or the
-    /// budget is spent. Returns `true` if all assignments were visited.
+    /// budget is spent. Returns `true` if all assignments were visited and `visit` always returned `true`.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(super) fn each(
         &self,

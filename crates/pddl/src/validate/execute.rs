@@ -117,8 +117,8 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 
     /// Determines the duration of a step: the exact value if an equality of the domain fixes it, else the
-    /// value stated in the plan. A stated value must satisfy all duration constraints at start within the
-    /// tolerance. Without a stated value, the value of the first equality must satisfy them.
+    /// value stated in the plan, else a chosen value. A stated value must satisfy all duration constraints at
+    /// start within the tolerance. Without a stated value, the value of the first equality must satisfy them.
     fn duration(
         &self,
         step: &Step<'p>,
@@ -161,8 +161,9 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(duration)
     }
 
-    /// Returns the duration that the planner chooses, if it has to be chosen. `None` if no constraint bounds it on
-    /// the side that the metric prefers, if such a bound is strict, or if a bound on the other side excludes it.
+    /// Returns the duration that the planner chooses. `None` without [`Options::chosen_durations`], if no constraint
+    /// bounds it on the side that the metric prefers, if such a bound is strict, or if a bound on the other side
+    /// excludes it.
     fn chosen_duration(&self, bounds: &[(Comparison, BigRational)]) -> Option<BigRational> {
         if !self.options.chosen_durations {
             return None;
@@ -303,7 +304,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 
     /// Applies the changes of a happening to the state. Recomputes the derived facts if a changed
-    /// fact or function occurs in a condition of an axiom. Returns a violation if an increased or
+    /// predicate or function occurs in a condition of an axiom. Returns a violation if an increased or
     /// scaled function has no value, or if its new value is too large.
     pub(super) fn apply(
         &mut self,

@@ -122,8 +122,7 @@ impl Footprint {
         self.values_written.extend(other.values_written);
     }
 
-    /// Returns a fact or function because of which the order of the two happenings matters; `None` if they do
-    /// not interfere.
+    /// Returns a fact or function at which the two happenings interfere; `None` if they do not interfere.
     pub(super) fn interferes(&self, other: &Self) -> Option<Ground> {
         let read_or_deleted = self.disturbs(other).or_else(|| other.disturbs(self));
         read_or_deleted.or_else(|| {

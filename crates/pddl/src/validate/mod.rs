@@ -1,6 +1,6 @@
 //! Plan validator: executes a plan by the definition below, with exact rational numbers.
 //!
-//! The validator shares no code with grounding and encoding: conditions are evaluated on the syntax tree.
+//! The validator uses neither grounding nor encoding: conditions are evaluated on the syntax tree.
 //! Derived predicates are the least fixpoint of their axioms, stratum by stratum (S. Thiébaux, J. Hoffmann,
 //! B. Nebel: In defense of PDDL axioms, AIJ 168, 2005).
 //!

@@ -1,7 +1,7 @@
 //! Enumerates all bindings that satisfy a condition: a conjunctive query over the facts of a state.
 //!
-//! Facts propose the objects of unbound variables, so that quantifiers over many variables do not enumerate
-//! all combinations. The depth-first search has an explicit stack, because a quantifier may bind more
+//! Facts propose the objects of unbound variables, so that existential quantifiers over many variables do not
+//! enumerate all combinations. The depth-first search has an explicit stack, because a quantifier may bind more
 //! variables than the call stack has frames.
 
 use crate::ast::{Atom, Condition, Expression, Name, Term, TypedName};

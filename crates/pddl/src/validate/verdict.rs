@@ -22,7 +22,7 @@ pub struct Verdict {
     pub violation: Option<Box<Violation>>,
 }
 
-/// An unsatisfied condition or an inexecutable step.
+/// Reason why a plan is invalid.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Violation {
@@ -36,7 +36,7 @@ pub struct Violation {
     pub kind: ViolationKind,
     /// Description, one sentence.
     pub message: String,
-    /// Conditions that do not hold.
+    /// Conjuncts that do not hold, if the violation is an unsatisfied condition or goal.
     pub unmet: Vec<Unmet>,
 }
 
@@ -52,9 +52,9 @@ impl std::error::Error for Violation {}
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Unmet {
-    /// Condition with objects for its variables.
+    /// Condition with objects for its free variables.
     pub condition: String,
-    /// Functions in the condition, with their values if defined.
+    /// Functions in the condition without quantified variables, with their values if defined.
     pub values: Vec<(String, Option<BigRational>)>,
 }
 
@@ -76,7 +76,7 @@ pub enum ViolationKind {
     OverAll,
     /// A condition at the end of an action does not hold.
     AtEnd,
-    /// A required value is undefined.
+    /// A required value is undefined or too large.
     Undefined,
     /// Two simultaneous effects conflict.
     Conflict,

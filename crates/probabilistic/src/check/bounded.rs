@@ -20,9 +20,9 @@ use crate::number::{Number, count};
 use crate::prism::ast::Steps;
 use crate::solve::{Direction, Problem, Work, solve_within};
 
-/// Upper limit (exclusive) on the bound of an accumulated reward, as a whole number.
+/// Upper limit (exclusive) on the greatest whole number within the bound on an accumulated reward.
 const MAX_BUDGET: usize = 100_000;
-/// Upper limit on the number of values that are stored at the same time: 4 GB of doubles.
+/// Upper limit on the number of values of smaller budgets that are stored at the same time: 4 GB of doubles.
 const MAX_VALUES: usize = 500_000_000;
 
 impl<N: Number> Query<'_, N> {
@@ -30,8 +30,8 @@ impl<N: Number> Query<'_, N> {
     /// Until then, the reward structure `name` must accumulate at most the bound in `steps`.
     ///
     /// Returns an error if a policy is given, or if there is a lower bound on the reward. An upper bound must
-    /// be nonnegative (for `<`: positive) and below [`MAX_BUDGET`], and all rewards must be nonnegative whole
-    /// numbers. Without any bound, solves `problem` itself.
+    /// be nonnegative (for `<`: positive), the greatest whole number within it must be below [`MAX_BUDGET`], and
+    /// all rewards must be nonnegative whole numbers. Without any bound, solves `problem` itself.
     pub fn until_within_reward(
         &self,
         problem: Problem<'_, N>,
@@ -146,8 +146,8 @@ struct Layers<N> {
 struct Sweep<'a, N> {
     problem: Problem<'a, N>,
     earned: &'a [usize],
-    /// The nonterminal states in topological order: successors by choices without reward come
-    /// first.
+    /// The states that are neither terminal nor blocked, in topological order: successors by choices without
+    /// reward come first.
     order: Vec<u32>,
     /// Upper limit on the rounding error that a single budget adds.
     error: f64,

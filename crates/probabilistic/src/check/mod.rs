@@ -66,7 +66,7 @@ pub struct Report {
     pub transitions: usize,
     /// Number of states without an enabled choice; each of them got a self-loop.
     pub deadlocks: usize,
-    /// The policy that attains the result, if it was requested and exists.
+    /// The policy that attains the result, if it was requested and computed.
     pub policy: Option<PolicyTable>,
     /// Time for exploring the model.
     pub build: Duration,
@@ -90,7 +90,8 @@ pub struct Report {
 /// ```
 ///
 /// # Errors
-/// An error in the model, the property, the constants or the policy, or an exceeded limit.
+/// An error in the model, the property, the constants or the policy, an exceeded limit, or a cancelled
+/// exploration.
 pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Result<Report, Error> {
     let reports = check_all(model, [property], options)?;
     reports.into_iter().next().unwrap_or_else(|| Err(Error::Property(Vec::new().into())))
@@ -99,8 +100,8 @@ pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Resul
 /// Checks several properties of a model. The properties share the exploration of the model.
 ///
 /// # Errors
-/// An error in the model, the constants or the declarations, or an exceeded limit. An error in the policy or
-/// in a single property is returned instead of the report for the property.
+/// An error in the model, the constants or the declarations, an exceeded limit, or a cancelled exploration. An
+/// error in the policy or in a single property is returned instead of the report for the property.
 pub fn check_all<'p>(
     model: &Model,
     properties: impl IntoIterator<Item = &'p Property>,

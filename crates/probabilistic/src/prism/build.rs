@@ -37,14 +37,14 @@ pub fn declare(names: &mut Names, variable: &ast::Variable) -> Result<Variable, 
 }
 
 /// Compiles a command. `writable` returns `true` if the command may assign the variable with this
-/// name. On failure, returns all errors in the command.
+/// name. On failure, returns the first error of each part (guard, probability or assignment).
 pub fn compile_command<N: Number>(
     command: &ast::Command,
     names: &mut Names,
     writable: impl Fn(&str) -> bool,
 ) -> Result<Command<N>, Vec<Diagnostic>> {
     let mut problems = Vec::new();
-    // A faulty expression is replaced by a constant, so that all problems of the command are reported.
+    // A faulty expression is replaced by a constant, so that the problems of the other parts are reported, too.
     let mut keep = |result: Result<Code, Diagnostic>| {
         result.unwrap_or_else(|problem| {
             problems.push(problem);

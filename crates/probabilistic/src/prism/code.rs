@@ -293,8 +293,8 @@ fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result
     }
 }
 
-/// Returns a power whose exponent is a fraction, if the power is rational. Returns `None` for other powers, and for
-/// operands beyond the size limits.
+/// Returns a power with a positive base and a fraction as its exponent, if the power is rational. Returns `None` for
+/// other powers, and for operands beyond the size limits.
 fn rational_power(base: &BigRational, exponent: &BigRational) -> Option<BigRational> {
     let degree = exponent.denom().to_u32().filter(|degree| *degree <= MAX_ROOT)?;
     if !base.is_positive() || base.size() > MAX_OPERAND_BITS {

@@ -72,8 +72,8 @@ impl<N> RewardItem<N> {
 }
 
 /// Evaluates the probabilities of a command's updates in a state and scales them to the sum 1.
-/// Fails if an expression has no value, a probability is negative, or the sum differs from 1 by
-/// more than [`SUM_TOLERANCE`].
+/// Fails if an expression has no value, a probability is negative or too small for doubles, or the
+/// sum differs from 1 by more than [`SUM_TOLERANCE`].
 pub fn probabilities<N: Number>(
     updates: &[Update],
     values: &[i64],

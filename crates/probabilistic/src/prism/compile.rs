@@ -43,7 +43,7 @@ impl Names {
     /// Declares the constants, formulas and labels of a model. Variables are added with [`Names::variable`].
     ///
     /// # Errors
-    /// A constant without a value, a value of another type, a value for an unknown constant, constants that
+    /// A constant without a value or with an invalid value, a value for an unknown constant, constants that
     /// depend on each other, or a name declared twice.
     pub fn new(model: &Model, settings: &Settings) -> Result<Self, Error> {
         let mut names = Self {
@@ -74,8 +74,8 @@ impl Names {
             }
         }
         let mut missing = Vec::new();
-        // A constant may use constants declared after it. Each round evaluates the constants whose names have values;
-        // a round without progress means that the remaining constants depend on each other.
+        // A constant may use constants declared after it. Each round evaluates the constants that use no constant
+        // without a value. A round without progress means that some of the remaining constants depend on each other.
         let mut waiting: Vec<_> = model.constants.iter().collect();
         while !waiting.is_empty() {
             let before = waiting.len();
@@ -195,7 +195,8 @@ impl Names {
     }
 
     /// Compiles an expression and returns it with its inferred type. Fails for an unknown name, a
-    /// wrong type, a circular formula, or an expression beyond [`MAX_DEPTH`] or [`MAX_PARTS`].
+    /// wrong type, a property, a circular formula or label, or an expression beyond [`MAX_DEPTH`] or
+    /// [`MAX_PARTS`].
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "depth and parts are refused as soon as they pass their limits, and each leaves the depth that it entered"

@@ -33,7 +33,7 @@ impl Guard {
         Self { remainder: parts.split_off(tests.len()), tests, fixed }
     }
 
-    /// Returns the variables that a conjunct fixes to a single value: variable index and value.
+    /// Returns the variables that a conjunct `variable = value` or `!variable` fixes: variable index and value.
     pub fn fixed(&self) -> &[(u32, i64)] {
         &self.fixed
     }

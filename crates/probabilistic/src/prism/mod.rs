@@ -2,8 +2,8 @@
 //!
 //! Supported are Markov chains and Markov decision processes of the PRISM manual
 //! (prismmodelchecker.org/manual/ThePRISMLanguage): modules with variables of finite range, renamed modules,
-//! synchronisation on actions, constants, formulas, rewards, and labels. Any other construct is an error with its
-//! position.
+//! synchronisation on actions, global variables, constants, formulas, rewards, labels, and `init … endinit`. Any
+//! other construct is an error with its position.
 
 pub mod ast;
 mod behaviour;

@@ -206,7 +206,7 @@ impl<N: Number> Program<N> {
     }
 
     /// Packs the values of the variables into a state. Returns `None` if a value is outside the range of its
-    /// variable.
+    /// variable, or if there are more or fewer values than variables.
     pub fn pack(&self, values: &[i64]) -> Option<Packed> {
         let fits = values.len() == self.variables.len()
             && self.variables.iter().zip(values).all(|(v, value)| (v.least..=v.greatest).contains(value));

@@ -18,8 +18,9 @@ use crate::prism::rename;
 /// ```
 ///
 /// # Errors
-/// All syntax errors; after an error, parsing continues with the next declaration. If the text
-/// contains invalid characters or unclosed quotation marks, only these are reported.
+/// The syntax errors and unsupported constructs; after an error, parsing continues with the next
+/// declaration or command. If the text contains invalid characters or unclosed quotation marks, only
+/// these are reported.
 pub fn parse(text: &str) -> Result<Model, Error> {
     let tokens = tokens(text).map_err(|problems| Error::Model(problems.into()))?;
     let mut cursor = Cursor::new(&tokens);
@@ -54,7 +55,7 @@ pub fn parse(text: &str) -> Result<Model, Error> {
     if problems.is_empty() { Ok(model) } else { Err(Error::Model(problems.into())) }
 }
 
-/// Recovers from an error: skips tokens up to the end of the declaration, or to a keyword that begins a declaration.
+/// Recovers from an error: skips tokens past the next `;`, or up to a keyword such as `module` or `endmodule`.
 fn skip(cursor: &mut Cursor<'_>) {
     cursor.reset();
     loop {

@@ -2,8 +2,8 @@
 //! modules.
 //!
 //! The choices and their order are the same as those of [`Program`]. If an evaluation fails in a state, or the
-//! commands of synchronising modules have too many combinations, the state is delegated to the program, which
-//! reports the error.
+//! commands of synchronising modules have too many combinations, the state is delegated to the program. The
+//! program reports the error, unless another module disables the command whose evaluation failed.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;

@@ -387,7 +387,7 @@ impl<N: Number> Generator<N> for Program<N> {
         self.computed_rewards.len()
     }
 
-    /// Returns the state rewards: the added loop has no action, and therefore no transition rewards.
+    /// Returns the state rewards: the added loop belongs to no command, and therefore has no transition rewards.
     fn loop_rewards(&self, state: &Packed) -> Result<Vec<N>, Error> {
         Ok(self.state_rewards(&self.values_of(state))?.into_vec())
     }

@@ -306,8 +306,8 @@ fn route_to_exits<N: Number>(
     }
 }
 
-/// Selects the states marked in `members` (the sure states) if `only_sure`, all states if only `include_sure`, and
-/// otherwise the states that are not marked.
+/// Returns the states that are marked in `members` (the sure states) if `only_sure` is `true`. Otherwise, returns all
+/// states if `include_sure` is `true`, and the states that are not marked if it is `false`.
 fn component_part(states: &[u32], members: &[bool], include_sure: bool, only_sure: bool) -> Vec<u32> {
     let is_selected = |sure: bool| if only_sure { sure } else { include_sure || !sure };
     states.iter().zip(members).filter(|(_, sure)| is_selected(**sure)).map(|(state, _)| *state).collect()

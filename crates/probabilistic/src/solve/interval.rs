@@ -27,7 +27,7 @@ pub struct Enclosed<N> {
     pub errors: Vec<f64>,
 }
 
-/// Upper limit on the work for one strongly connected component: the number of evaluated
+/// Upper limit on the work for one strongly connected component: about the number of evaluated
 /// transitions and equations.
 const MAX_WORK: u64 = 30_000_000_000;
 /// Maximum number of sweeps within which a candidate bound has to be confirmed by the equations.
@@ -141,8 +141,8 @@ fn rounding<N: Number>(quotient: &Quotient<N>) -> f64 {
 }
 
 impl<'a, N: Number> Rows<'a, N> {
-    /// Uses the equations without sorting them. Blocks of states that were discovered last come first; they are
-    /// usually closest to an exit.
+    /// Uses the equations without sorting them. Without end components, states that were discovered last come
+    /// first; they are usually closest to an exit.
     fn of(quotient: &'a Quotient<N>, direction: Direction) -> Self {
         Self {
             direction,

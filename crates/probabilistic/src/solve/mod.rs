@@ -179,9 +179,10 @@ impl<N: Number> Run<'_, N> {
         }
     }
 
-    /// Returns the value of a choice in a state that is a component by itself, and an upper limit on the error
-    /// of the value. With `must_be_sure`, returns `None` for a choice after which a terminal state is not
-    /// reached with probability 1. With rewards, also returns `None` for a choice that never leaves the state.
+    /// Returns the value of a choice whose successors, except the state itself, are solved already, and an upper
+    /// limit on the error of the value. With `must_be_sure`, returns `None` for a choice after which a terminal
+    /// state is not reached with probability 1. With rewards, also returns `None` for a choice that never leaves
+    /// the state.
     fn single_choice(&mut self, state: usize, choice: usize, must_be_sure: bool) -> Option<(N, f64)> {
         let mdp = self.problem.mdp;
         let (mut sum, mut leaving, mut looping) = (self.problem.reward(choice), N::zero(), false);
