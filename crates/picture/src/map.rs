@@ -23,7 +23,8 @@ const LEAST_HEIGHT: f64 = 60.0;
 /// Maximum height of a map without margins, unless its places would then be too close to each
 /// other.
 const HEIGHT: f64 = 420.0;
-/// Maximum length of short ways (5 % quantile), which keeps small maps small.
+/// Limits the scale of a map: the 5 % quantile of the lengths of its ways is drawn at most this long. Maps with
+/// few places thus stay small.
 const FARTHEST: f64 = 130.0;
 /// Maximum width and height to which a map is enlarged to separate its places.
 const LARGEST: f64 = 4_000.0;
@@ -289,9 +290,9 @@ fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> M
     }
 }
 
-/// Finds a free rectangle for a text near a point, at the distance `reach`, and marks it as
-/// occupied. No line crosses it if possible. Returns the left end of the base line, or `None` if no
-/// position is free.
+/// Finds a free rectangle for a text near a point, at the distance `reach` or slightly farther, and
+/// marks it as occupied. No line crosses it if possible. Returns the left end of the base line, or
+/// `None` if no position is free.
 fn room(
     (x, y): Point,
     (reach, width): (f64, f64),

@@ -78,7 +78,8 @@ impl<'a> Encoding<'a> {
     }
 
     /// Adds clauses for a lower cost limit. A limit above that of the encoding has no effect. An encoding
-    /// without a cost limit stays unchanged.
+    /// without a cost limit stays unchanged. With `CostEncoding::Apart`, only a limit below the lower bound has an
+    /// effect.
     pub fn tighten(&mut self, limit: Int) {
         if let Some(cost) = &self.cost {
             cost.at_most(&mut self.formula, limit);

@@ -541,7 +541,7 @@ impl ValueSetField {
 #[expect(clippy::arithmetic_side_effects, reason = "bits of a word, and words in memory")]
 fn fields(task: &Task) -> (Vec<ValueSetField>, usize) {
     let mut fields = Vec::with_capacity(task.basic);
-    // The last word, and the number of its used bits.
+    // The number of words, and the number of used bits of the last word.
     let (mut words, mut used) = (0, 64);
     for variable in VariableId::all(task.basic) {
         let size = dense(task.variables[variable.index()].values.len());

@@ -20,7 +20,7 @@ pub(super) struct FactLandmark {
     pub(super) later_facts: Vec<Fact>,
 }
 
-/// Returns the fact landmarks of basic variables. In a large task, some may be missing.
+/// Returns the fact landmarks of basic variables. Some or all may be missing, for example in a large task.
 pub(super) fn fact_landmarks(context: Context<'_>) -> Result<Vec<FactLandmark>, Interrupted> {
     let Context { task, limits } = context;
     let Some(relaxation) = DeleteRelaxation::new(task) else { return Ok(Vec::new()) };

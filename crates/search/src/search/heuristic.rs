@@ -12,7 +12,7 @@ pub trait Heuristic<N> {
     /// Returns the heuristic value of a state, or `None` if the goal is proved unreachable.
     fn estimate(&self, state: &State<N>) -> Option<N>;
 
-    /// Returns a more accurate but slower heuristic, if one is available.
+    /// Returns a slower heuristic that is usually more accurate, if one is available.
     fn sharper(&self, _: &Task<N>) -> Option<Box<dyn LazyHeuristic<N>>> {
         None
     }

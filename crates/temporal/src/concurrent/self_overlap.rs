@@ -307,7 +307,7 @@ impl<T: TimeNumber> Index<'_, T> {
     }
 
     /// Returns `true` if a run of `own` that starts during another run of `own` certainly has the same
-    /// duration as that run.
+    /// duration as that run, and the start changes no other number.
     fn lasts_as_long(&self, own: &Instance<T>, start: &Operator, invariant: &Invariant) -> bool {
         start.numeric_effects.iter().all(|effect| {
             let mut numbers =
@@ -316,8 +316,8 @@ impl<T: TimeNumber> Index<'_, T> {
         })
     }
 
-    /// Returns `true` if no happening during a run, other than those of `own`, reads or sets the
-    /// variable, and no axiom reads it.
+    /// Returns `true` if nothing but the starts and ends of `own` certainly reads or sets the variable
+    /// during a run.
     fn is_hidden(
         &self,
         own: &Instance<T>,

@@ -24,7 +24,8 @@ use task::number::{Int, dense};
 use crate::concurrent::time::{TimeExpression, TimePoint, place};
 use crate::concurrent::time_number::TimeNumber;
 
-/// Id of an access kind: a way of accessing (such as read or delete) one atom, number or design.
+/// Id of an access kind: a way of accessing (such as read or delete) one atom, number or design, or the end of
+/// one action.
 pub(super) type Key = u32;
 
 /// A running action. The action starts `offset` after its time point `float`.
@@ -51,8 +52,8 @@ struct Start<T: TimeNumber = Int> {
 pub(super) struct SimpleTemporalNetwork<T: TimeNumber = Int> {
     /// Time of the latest access of each kind, sorted by key.
     entries: Vec<(Key, TimeExpression<T>)>,
-    /// Time of the latest change of each variable, sorted by variable. Variables that never changed
-    /// have no entry.
+    /// Time of the latest change of each goal variable and guard, sorted by variable. Other variables
+    /// and those that never changed have no entry.
     changed: Vec<(u32, TimeExpression<T>)>,
     floats: Vec<Start<T>>,
     /// Running actions, sorted by instance. Runs of one instance are in the order of their starts,
@@ -168,7 +169,7 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
     }
 
     /// Earliest possible time of the latest change of a variable. Returns `None` if the variable
-    /// never changed.
+    /// never changed, or is neither a goal variable nor a guard.
     pub(super) fn changed(&self, variable: u32) -> Option<T> {
         self.change(variable).map(|time| time.base)
     }
