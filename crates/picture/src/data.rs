@@ -187,9 +187,9 @@ pub struct Log {
     pub name: String,
     /// A sentence that states whether the journal is usable.
     pub verdict: String,
-    /// Summary of the contents, each entry in a sentence.
+    /// Descriptions of the segments and snapshots, one line each.
     pub parts: Vec<String>,
-    /// Errors found in the journal.
+    /// Errors and warnings found in the journal.
     pub messages: Vec<String>,
     /// All inputs and decisions, in chronological order.
     pub happenings: Vec<Happening>,
@@ -204,7 +204,7 @@ pub struct Happening {
     pub time: f64,
     /// Kind of the input or decision.
     pub kind: Kind,
-    /// Description in a sentence.
+    /// Description in a sentence; for an event, the received line.
     pub text: String,
     /// Derivations or other details.
     pub because: Vec<Reason>,

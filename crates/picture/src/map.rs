@@ -1,7 +1,8 @@
 //! Draws the map of the places of a mission, with the moves of a plan coloured by configuration.
 //!
 //! Moves in opposite directions are drawn side by side. All moves from one place to another share
-//! an arrow with their step numbers. All lengths are in pixels, except those of [`Map`].
+//! an arrow with the first three of their step numbers. All lengths are in pixels, except those of
+//! [`Map`].
 
 use std::collections::BTreeMap;
 
@@ -361,7 +362,7 @@ fn pixels(map: &Map, canvas: Canvas, has_loops: bool) -> (Vec<Point>, f64, f64) 
         .ways
         .iter()
         .map(|(one, other)| (points[*one].0 - points[*other].0).hypot(points[*one].1 - points[*other].1));
-    // Ways between places at equal positions are ignored, because such places are separated later.
+    // Ways between places at nearly equal positions are ignored; such places are separated later.
     let shortest = across.max(upwards) * SAME / LARGEST;
     let mut lengths: Vec<f64> = lengths.filter(|length| *length > shortest).collect();
     lengths.sort_by(f64::total_cmp);

@@ -17,7 +17,7 @@ pub(super) struct SegmentGoal {
     /// regression, all basic facts of the state in which the replaced segment ended.
     pub(super) facts: Vec<Fact>,
     suffix: Vec<GroundStep>,
-    /// `true` if the facts suffice: the suffix is executable in every state that has them.
+    /// `true` if the facts suffice: the suffix is a plan from every state that has them.
     is_complete: bool,
 }
 

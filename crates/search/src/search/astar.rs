@@ -113,7 +113,8 @@ pub struct AStar<'a, N, E> {
     /// `true` if states were dropped because a number overflowed. The search then proves nothing.
     states_dropped: bool,
     order: OpenListOrder,
-    /// More accurate heuristic that is evaluated only when a node is about to be expanded (lazy A\*).
+    /// Slower heuristic that is usually more accurate. It is evaluated only when a node is about to be
+    /// expanded (lazy A\*).
     pub(super) lazy_heuristic: Option<Box<dyn LazyHeuristic<N>>>,
     /// Heuristic that improves during the search, shared with other searches. It is evaluated whenever a node is
     /// about to be expanded, before the lazy heuristic.
@@ -287,7 +288,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// Evaluates the more accurate heuristics for a node that is about to be expanded. Returns the key of the node,
+    /// Evaluates the improving and the lazy heuristic for a node that is about to be expanded. Returns its key,
     /// or `None` if the node was pruned or reinserted with a higher key.
     fn reevaluate(&mut self, id: u32, key: NodeKey<N>) -> Option<NodeKey<N>> {
         if let Some(improving) = &self.improving_heuristic {

@@ -17,8 +17,8 @@ pub trait Heuristic<N> {
         None
     }
 
-    /// Returns a heuristic that improves during the search, if one is available. `max_work` limits the effort
-    /// for its computation, in work units.
+    /// Returns a heuristic that improves during the search, if one is available. `max_work` limits most of the
+    /// effort for its computation, in work units.
     fn improving(&self, _: Context<'_, N>, _max_work: u64) -> Option<Box<dyn LazyHeuristic<N>>> {
         None
     }

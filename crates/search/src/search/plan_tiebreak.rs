@@ -42,7 +42,7 @@ const PAIR_LIMIT: usize = 50_000_000;
 #[derive(Debug, Clone)]
 struct Label {
     state: State,
-    /// Last design of each function, if the function was used.
+    /// Last design of each function, in the plan or before it; `None` if it is not known.
     designs: Vec<Option<ObjectId>>,
     cost: Int,
     steps: usize,

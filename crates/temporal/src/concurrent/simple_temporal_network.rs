@@ -2,12 +2,12 @@
 //!
 //! The times of a sequence of happenings and the constraints between them form a simple temporal network. A
 //! later happening adds lower bounds: it takes place at or after an earlier time, or at least the separation
-//! after it. The network therefore keeps only the latest time of each kind of access to each atom. Upper
-//! bounds come only from timed initial literals, which earlier happenings must not follow. Happenings that
-//! must be simultaneous share a *time point*. Starts of running actions are time points that can still be
-//! delayed, together with the happenings that depend on them, so that an end meets its constraints. An end
-//! fixes its time point at the earliest possible time. Happenings that do not interfere are not ordered by
-//! their position in the sequence \[2\].
+//! after it. The network therefore keeps only the latest time of each kind of access. Upper bounds come
+//! only from timed initial literals, which earlier happenings must not follow. Happenings that must be
+//! simultaneous share a *time point*. Starts of running actions are time points that can still be delayed,
+//! together with the happenings that depend on them, so that an end meets its constraints. A time point
+//! that is no longer needed is fixed at the earliest possible time. Happenings that do not interfere are
+//! not ordered by their position in the sequence \[2\].
 //!
 //! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each a duration plus the
 //! separation, which have at most [`TimeNumber::TIME_BITS`] bits. Missing upper bounds

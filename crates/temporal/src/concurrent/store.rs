@@ -76,7 +76,7 @@ pub(super) struct Store<'a, T: TimeNumber = Int> {
     table: HashTable<u32>,
     nodes: Vec<Node<T>>,
     bytes: usize,
-    /// Sum, over all new nodes, of the number of stored nodes that may dominate them.
+    /// Sum, over all calls of `add`, of the number of stored nodes that may dominate the state.
     pub(super) compared: usize,
 }
 

@@ -30,8 +30,8 @@ use crate::concurrent::time_number::TimeNumber;
 /// A time of the relaxation. Times only guide the search, so larger ones saturate.
 type Time = i64;
 
-/// Durations are rounded down so that they have at most this number of bits. Sums of thousands of them then
-/// fit.
+/// Constant times are rounded down so that they have at most this number of bits. Sums of thousands of them
+/// then fit.
 const TIME_BITS: u64 = 48;
 const NEVER: Time = Time::MAX;
 const MAX_REPETITIONS: u32 = 8;
@@ -66,7 +66,7 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
     timings: Vec<Timing>,
     durations: Vec<Duration<T>>,
     separation: Time,
-    /// Times are rounded to multiples of 2^`shift` internal time units.
+    /// Times are in units of 2^`shift` internal time units, rounded down.
     shift: u64,
     /// For each proposition: the time from which it holds, and an estimate of the number of actions of its relaxed plan.
     values: Vec<(Time, u32)>,
