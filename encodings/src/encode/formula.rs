@@ -28,7 +28,7 @@ pub enum Family {
     Frame,
     /// Clauses by which the derived variables are the least fixpoint of their rules.
     Axiom,
-    /// Clauses by which each function in use has exactly one suitable design.
+    /// Clauses by which each function in use has exactly one suitable design, in no forbidden combination.
     Selection,
     /// Symmetry breaking: of interchangeable designs of a slot only the first is used, and interchangeable
     /// objects are first used in a fixed order.

@@ -10,7 +10,7 @@
 //! determine whether a conditional effect occurs, both outcomes are transitions. The abstraction therefore
 //! admits every plan of the task.
 //!
-//! Each goal fact and each fact landmark is a subtask with an abstraction of its own. A fact landmark is a fact
+//! Goal facts and fact landmarks are subtasks, each with an abstraction of its own. A fact landmark is a fact
 //! without which the goal is unreachable in the delete relaxation. A landmark is required only while it was not
 //! yet achieved. Therefore, the facts that are unreachable without the landmark count as goals of its subtask.
 //!

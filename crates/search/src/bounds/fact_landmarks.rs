@@ -15,8 +15,8 @@ const MAX_VISITS: u64 = 30_000_000;
 /// A landmark that does not hold in the initial state and is no goal fact.
 pub(super) struct FactLandmark {
     pub(super) fact: Fact,
-    /// The facts of basic variables that are unreachable in the delete relaxation unless the landmark was
-    /// achieved before, without the landmark itself.
+    /// The other facts of basic variables that are unreachable in the delete relaxation unless the landmark was
+    /// achieved before.
     pub(super) later_facts: Vec<Fact>,
 }
 

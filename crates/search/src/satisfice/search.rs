@@ -149,7 +149,8 @@ impl<N: TaskNumber> Search<N> {
         search
     }
 
-    /// Returns the approximate memory use of states, nodes, landmarks and open lists, in 64-bit words.
+    /// Returns the approximate memory use of states, nodes, landmarks, open lists and novelty table, in 64-bit
+    /// words.
     pub(super) fn size(&self) -> usize {
         let nodes = self.nodes.len().saturating_mul(size_of::<Node<N>>() / 8);
         let states = self.store.size().saturating_add(nodes).saturating_add(self.reached.len());

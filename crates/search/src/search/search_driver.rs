@@ -7,9 +7,9 @@
 //! provides an upper bound. Then two A\* searches alternate: both use pattern databases, the second also LM-cut.
 //! After some work, they share online cost partitioning; computing its abstractions earlier would take longer
 //! than most proofs. The LM-cut search first gets a quarter of the other's work, and later the same work. After
-//! much work, a search whose lower bound lags behind that of the other gets half of the work. The result of the
-//! search that finishes first is returned. Work is counted in units instead of time, so the result without a
-//! time limit is deterministic.
+//! much work, a search whose lower bound lags behind that of the other gets half of the work, and is finally
+//! abandoned. The result of the search that finishes first is returned. Work is counted in units instead of
+//! time, so the result without a time limit is deterministic.
 
 use std::cell::RefCell;
 use std::rc::Rc;
