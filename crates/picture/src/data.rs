@@ -3,13 +3,13 @@
 /// A plan and the progress of the search that found it.
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
-    /// A sentence about the cost of the plan and the proof of its optimality.
+    /// A sentence about the plan, such as its cost and what is proved about it.
     pub verdict: String,
-    /// The executed actions, ordered by start.
+    /// The actions of the plan, ordered by start.
     pub steps: Vec<Step>,
     /// The quantity on the horizontal axis.
     pub axis: Axis,
-    /// The accumulated cost, and each numeric fluent that the plan changes or a condition bounds.
+    /// The cost during the plan, and each numeric fluent that the plan changes or a condition bounds.
     pub curves: Vec<Curve>,
     /// The map of the mission's places, if there is one.
     pub map: Option<Map>,
@@ -25,14 +25,14 @@ pub enum Axis {
     /// Time, in the time unit of the domain.
     #[default]
     Time,
-    /// Steps of equal length, for actions without durations.
+    /// Steps of equal length, for sequences with an action that has no duration.
     Steps,
 }
 
-/// An executed action with its configuration.
+/// An action of a plan with its configuration.
 #[derive(Debug, Clone, Default)]
 pub struct Step {
-    /// The action with its arguments; arguments that are functions and designs are omitted.
+    /// The action with its arguments; functions and designs of the configuration are omitted.
     pub label: String,
     /// Position of the start on the horizontal axis.
     pub start: f64,
@@ -53,10 +53,10 @@ pub struct Step {
     pub way: Option<(usize, usize)>,
 }
 
-/// The values of a numeric fluent over a plan.
+/// The values of a numeric fluent, or of the cost, over a plan.
 #[derive(Debug, Clone, Default)]
 pub struct Curve {
-    /// Name of the fluent.
+    /// Name of the fluent, or `cost`.
     pub name: String,
     /// The changes: position on the horizontal axis, and new value. The first entry is the initial
     /// value, if the fluent has one.
@@ -132,10 +132,10 @@ pub struct Design {
     pub because: Vec<Reason>,
 }
 
-/// A derivation tree of an inferred fact.
+/// A derivation tree of an inferred fact, or another detail.
 #[derive(Debug, Clone, Default)]
 pub struct Reason {
-    /// The derived fact with its justification.
+    /// The derived fact with its justification, or the detail.
     pub text: String,
     /// Derivations of the premises.
     pub supports: Vec<Reason>,
@@ -187,9 +187,9 @@ pub struct Log {
     pub name: String,
     /// A sentence that states whether the journal is usable.
     pub verdict: String,
-    /// Summary of the contents, each entry in a sentence.
+    /// Descriptions of the segments and snapshots, one line each.
     pub parts: Vec<String>,
-    /// Errors found in the journal.
+    /// Errors and warnings found in the journal.
     pub messages: Vec<String>,
     /// All inputs and decisions, in chronological order.
     pub happenings: Vec<Happening>,
@@ -204,7 +204,7 @@ pub struct Happening {
     pub time: f64,
     /// Kind of the input or decision.
     pub kind: Kind,
-    /// Description in a sentence.
+    /// Description in a sentence; for an event, the received line.
     pub text: String,
     /// Derivations or other details.
     pub because: Vec<Reason>,
@@ -215,7 +215,7 @@ pub struct Happening {
 pub enum Kind {
     /// A line that the loop received, such as a report from the robot.
     Event,
-    /// A conclusion, or the failure to conclude.
+    /// A conclusion, the failure to conclude, or a reported value that is missing or not adopted yet.
     Inference,
     /// Progress of planning: a plan was requested, found, kept, or not found, or the goal is
     /// reached.

@@ -1,7 +1,8 @@
 //! Draws the map of the places of a mission, with the moves of a plan coloured by configuration.
 //!
 //! Moves in opposite directions are drawn side by side. All moves from one place to another share
-//! an arrow with their step numbers. All lengths are in pixels, except those of [`Map`].
+//! an arrow with the first three of their step numbers. All lengths are in pixels, except those of
+//! [`Map`].
 
 use std::collections::BTreeMap;
 
@@ -23,7 +24,8 @@ const LEAST_HEIGHT: f64 = 60.0;
 /// Maximum height of a map without margins, unless its places would then be too close to each
 /// other.
 const HEIGHT: f64 = 420.0;
-/// Maximum length of short ways (5 % quantile), which keeps small maps small.
+/// Limits the scale of a map: the 5 % quantile of the lengths of its ways is drawn at most this long. Maps with
+/// few places thus stay small.
 const FARTHEST: f64 = 130.0;
 /// Maximum width and height to which a map is enlarged to separate its places.
 const LARGEST: f64 = 4_000.0;
@@ -289,9 +291,9 @@ fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> M
     }
 }
 
-/// Finds a free rectangle for a text near a point, at the distance `reach` or a little farther, and marks it
-/// as occupied. No line crosses it if possible. Returns the left end of the base line, or `None` if no
-/// position is free.
+/// Finds a free rectangle for a text near a point, at the distance `reach` or slightly farther, and
+/// marks it as occupied. No line crosses it if possible. Returns the left end of the base line, or
+/// `None` if no position is free.
 fn room(
     (x, y): Point,
     (reach, width): (f64, f64),
@@ -360,7 +362,7 @@ fn pixels(map: &Map, canvas: Canvas, has_loops: bool) -> (Vec<Point>, f64, f64) 
         .ways
         .iter()
         .map(|(one, other)| (points[*one].0 - points[*other].0).hypot(points[*one].1 - points[*other].1));
-    // Ways between places at equal positions are ignored, because such places are separated later.
+    // Ways between places at nearly equal positions are ignored; such places are separated later.
     let shortest = across.max(upwards) * SAME / LARGEST;
     let mut lengths: Vec<f64> = lengths.filter(|length| *length > shortest).collect();
     lengths.sort_by(f64::total_cmp);

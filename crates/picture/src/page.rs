@@ -12,7 +12,7 @@ use crate::svg::{Picture, clean};
 pub const STYLE: &str = concat!(include_str!("picture.css"), include_str!("page.css"));
 /// The only script of a page. Without it, all contents are still visible.
 const SCRIPT: &str = include_str!("page.js");
-/// Digest of the script, the only one that the content security policy admits.
+/// Digest of the only script that the content security policy admits.
 const DIGEST: &str = "sha256-fZ3YNffJKRqSukU6Y8OoyeJ/9kokzwiOieJxn4wpNoc=";
 
 /// The CSS classes of the columns in which pictures are shown, in the order of [`PAGE`].

@@ -13,8 +13,8 @@ pub(crate) struct Palette {
 }
 
 impl Palette {
-    /// Assigns colours to the designs of all plans in the order of their use, then to
-    /// configurations of several designs.
+    /// Assigns colours to the designs of all plans in the order of their use, then to the other
+    /// configurations.
     pub(crate) fn of(plans: &[&Plan]) -> Self {
         let mut palette = Self::default();
         let steps = || plans.iter().flat_map(|plan| &plan.steps);

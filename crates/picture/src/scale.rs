@@ -1,6 +1,6 @@
 //! Linear scales, axis ticks, number formats and text widths.
 
-/// Maximum width in pixels of a character of the pictures' fixed-width font at 11 pixels.
+/// Maximum width in pixels of an ASCII character of the pictures' fixed-width font at 11 pixels.
 const CHARACTER: f64 = 6.75;
 
 #[derive(Debug, Clone, Copy)]
@@ -77,8 +77,8 @@ pub(crate) fn width(text: &str) -> f64 {
     text.chars().map(|character| if character.is_ascii() { CHARACTER } else { 2.0 * CHARACTER }).sum()
 }
 
-/// Truncates a text with an ellipsis to a width in pixels. The result is empty if only one of
-/// several characters would remain.
+/// Truncates a text with an ellipsis to a width in pixels. The result is empty if the text does not
+/// fit and fewer than two of its characters would remain.
 pub(crate) fn fit(text: &str, room: f64) -> String {
     if width(text) <= room {
         return text.to_owned();

@@ -119,8 +119,9 @@ impl Cost {
         }
     }
 
-    /// Adds clauses that admit only plans with a cost of at most `limit`. A limit above that of the encoding
-    /// has no effect. With weighted literals, only a limit below the lower bound has an effect.
+    /// Adds clauses that admit only plans with a cost of at most `limit`, if costs are encoded. A limit above
+    /// that of the encoding has no effect. With weighted literals, only a limit below the lower bound has an
+    /// effect.
     pub(super) fn at_most(&self, formula: &mut Formula, limit: Int) {
         // The gap is negative if no plan can have this cost.
         let gap = limit.saturating_sub(self.lower);

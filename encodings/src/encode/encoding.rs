@@ -77,8 +77,8 @@ impl<'a> Encoding<'a> {
         Self { task, formula, variables, cost }
     }
 
-    /// Adds clauses for a lower cost limit. A limit above that of the encoding has no effect. An encoding
-    /// without a cost limit stays unchanged.
+    /// Adds clauses for a lower cost limit, if costs are encoded (see [`CostLimit`]). A limit above that of
+    /// the encoding has no effect. With `CostEncoding::Apart`, only a limit below the lower bound has an effect.
     pub fn tighten(&mut self, limit: Int) {
         if let Some(cost) = &self.cost {
             cost.at_most(&mut self.formula, limit);

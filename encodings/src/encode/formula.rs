@@ -28,18 +28,19 @@ pub enum Family {
     Frame,
     /// Clauses by which the derived variables are the least fixpoint of their rules.
     Axiom,
-    /// Clauses by which each function in use has exactly one suitable design.
+    /// Clauses by which each function in use has exactly one suitable design, in no forbidden combination.
     Selection,
     /// Symmetry breaking: of interchangeable designs of a slot only the first is used, and interchangeable
     /// objects are first used in a fixed order.
     Symmetry,
     /// Clauses for exact integer arithmetic on numeric variables.
     Numeric,
-    /// Clauses that sum the cost of the plan.
+    /// Clauses that sum the cost of the plan, and exclude costs above the limit of the encoding.
     Cost,
     /// Clauses by which the last state satisfies the goal.
     Goal,
-    /// Clauses for the cost limit; usually the plan has to be cheaper than the incumbent.
+    /// Clauses for a cost limit that is lowered later, usually below the cost of the incumbent, or that no plan
+    /// can meet. Also the clauses of core-guided search.
     Bound,
 }
 
@@ -113,8 +114,8 @@ pub enum VariableMeaning {
     /// Selector of clauses that hold while it is assumed: they exclude known plans, or require a difference from
     /// a known plan.
     Others,
-    /// At least a certain number of the literals of a core are true (variable of a totalizer of the
-    /// core-guided search).
+    /// At least a certain number of the literals of a core, or of a part of the core, are true (variable of a
+    /// totalizer of the core-guided search).
     Paid,
     /// Auxiliary variable without a meaning in the task, for example of an at-most-one constraint.
     Ladder,

@@ -142,7 +142,7 @@ impl Transition<'_, '_> {
 
     /// Adds the constants and table entries of the operators `members` to `base`: one summand for the
     /// constants, and one summand for the tables of each set of slots. `active` is true if a member is
-    /// executed. The sum has `width` bits.
+    /// executed. The sum has `width` bits, or is `base` if nothing is added.
     fn plus_quantities(
         &mut self,
         base: Bits,

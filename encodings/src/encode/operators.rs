@@ -52,8 +52,8 @@ pub(super) fn conditions(builder: &mut Builder<'_>, step: usize) {
     }
 }
 
-/// Adds clauses for the effects of the operators at a step, except effects on numbers. `fires`
-/// contains the conditional effects, which prevail over unconditional ones.
+/// Adds clauses for the unconditional effects of the operators at a step, except effects on numbers.
+/// `fires` contains the conditional effects, which prevail over unconditional ones.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "steps are fewer than the horizon, whose formula is in memory"

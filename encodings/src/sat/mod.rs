@@ -98,7 +98,7 @@ impl Backend {
     ///
     /// # Errors
     ///
-    /// The program cannot be started or answers wrongly.
+    /// The program cannot be started, fails, does not end in time or answers wrongly.
     pub fn check(&self) -> Result<(), BackendError> {
         let Self::Program { command, .. } = self else { return Ok(()) };
         let variable = Lit::TRUE;

@@ -89,8 +89,8 @@ impl Program {
         }
     }
 
-    /// Runs the program once on all clauses, and checks its answer. A fault of the program is stored in
-    /// `failure`, and the answer is then `Interrupted`.
+    /// Runs the program once on all clauses, and checks the assignment if it reports one. A fault of the
+    /// program is stored in `failure`, and the answer is then `Interrupted`.
     fn decide(&mut self) -> Answer {
         let read = match self.run() {
             Ok(None) => return Answer::Interrupted,

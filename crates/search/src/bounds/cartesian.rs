@@ -10,7 +10,7 @@
 //! determine whether a conditional effect occurs, both outcomes are transitions. The abstraction therefore
 //! admits every plan of the task.
 //!
-//! Each goal fact and each fact landmark is a subtask with an abstraction of its own. A fact landmark is a fact
+//! Goal facts and fact landmarks are subtasks, each with an abstraction of its own. A fact landmark is a fact
 //! without which the goal is unreachable in the delete relaxation. A landmark is required only while it was not
 //! yet achieved. Therefore, the facts that are unreachable without the landmark count as goals of its subtask.
 //!
@@ -541,7 +541,7 @@ impl ValueSetField {
 #[expect(clippy::arithmetic_side_effects, reason = "bits of a word, and words in memory")]
 fn fields(task: &Task) -> (Vec<ValueSetField>, usize) {
     let mut fields = Vec::with_capacity(task.basic);
-    // The last word, and the number of its used bits.
+    // The number of words, and the number of used bits of the last word.
     let (mut words, mut used) = (0, 64);
     for variable in VariableId::all(task.basic) {
         let size = dense(task.variables[variable.index()].values.len());

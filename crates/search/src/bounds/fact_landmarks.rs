@@ -15,12 +15,12 @@ const MAX_VISITS: u64 = 30_000_000;
 /// A landmark that does not hold in the initial state and is no goal fact.
 pub(super) struct FactLandmark {
     pub(super) fact: Fact,
-    /// The facts of basic variables that are unreachable in the delete relaxation unless the landmark was
-    /// achieved before, without the landmark itself.
+    /// The other facts of basic variables that are unreachable in the delete relaxation unless the landmark was
+    /// achieved before.
     pub(super) later_facts: Vec<Fact>,
 }
 
-/// Returns the fact landmarks of basic variables. In a large task, some may be missing.
+/// Returns the fact landmarks of basic variables. Some or all may be missing, for example in a large task.
 pub(super) fn fact_landmarks(context: Context<'_>) -> Result<Vec<FactLandmark>, Interrupted> {
     let Context { task, limits } = context;
     let Some(relaxation) = DeleteRelaxation::new(task) else { return Ok(Vec::new()) };

@@ -4,7 +4,7 @@
 //! goal states yields an admissible and consistent heuristic: a pattern database \[1\]. Dynamic programming
 //! over steps and abstract states yields two more results: the operators that can occur at each step of a
 //! plan within a cost limit, and the number of steps above which no such plan exists. Cost partitioning adds
-//! the values of several projections. LM-cut is a more accurate but slower heuristic. Lower bounds on the
+//! the values of several projections. LM-cut is slower, but usually more accurate. Lower bounds on the
 //! consumption of resources detect dead ends.
 //!
 //! \[1\] S. Edelkamp: Planning with pattern databases, ECP 2001.

@@ -24,9 +24,9 @@ use crate::bounds::cartesian::{RefinementLimits, Subtask, cartesian_abstraction,
 use crate::bounds::fact_landmarks::fact_landmarks;
 use crate::bounds::pattern_database::Projection;
 
-/// Upper limit on the number of transitions of all abstractions together.
+/// Approximate upper limit on the number of abstract states and transitions of all abstractions together.
 const MAX_TRANSITIONS: usize = 1_000_000;
-/// Upper limit on the number of transitions of a projection. Greater projections are omitted.
+/// Upper limit on the number of abstract states and transitions of a projection. Greater projections are omitted.
 const MAX_PROJECTION_SIZE: usize = 100_000;
 const MIN_STRIDE: usize = 8;
 const MAX_PARTITIONINGS: usize = 128;
@@ -36,7 +36,7 @@ const TABLE_SHARE: usize = 8;
 const WORK_PER_VISIT: u64 = 10;
 /// Work units of an evaluation, for each abstraction.
 const WORK_PER_ABSTRACTION: u64 = 20;
-/// Divisor: computing an order may take at most 1/4 of the work for evaluations and expansions since the last order.
+/// Divisor: an order may take at most about 1/4 of the work for evaluations and expansions until the next order.
 const ORDER_SHARE: u64 = 4;
 /// Work units of A\* for each evaluated state, approximately.
 const WORK_PER_EVALUATION: u64 = 5_000;
@@ -45,7 +45,7 @@ const WORK_PER_EVALUATION: u64 = 5_000;
 pub struct OnlineCostPartitioning {
     abstractions: Vec<Abstraction>,
     costs: Vec<u32>,
-    /// Greatest common divisor of the operator costs. `costs` and distances are multiples of it.
+    /// Greatest common divisor of the operator costs: the unit in which `costs` and distances are counted.
     unit: Int,
     /// For each abstraction: for each abstract state, a row of `stride` goal distances. The first is the distance
     /// under the full costs, the others under the shares of cost partitionings.
@@ -212,7 +212,7 @@ impl OnlineCostPartitioning {
         };
         let is_better = value > estimate;
         self.failures = if is_better { 0 } else { (self.failures + 1).min(10) };
-        // The pause doubles after each order in a row that is not kept.
+        // The pause doubles after each order in a row that is not kept, at most ten times.
         let pause = (self.order_work * ORDER_SHARE / WORK_PER_EVALUATION).max(1) << self.failures;
         self.next_order = self.evaluations.saturating_add(pause);
         if is_better {

@@ -30,7 +30,7 @@ struct List<K> {
 #[derive(Debug)]
 pub struct AlternatingOpenList<K> {
     lists: Vec<List<K>>,
-    /// Steps of all entries. A step is the id of an operator with designs.
+    /// Steps of all entries: numbers that the caller chooses, such as ids of operators with designs.
     steps: Vec<u32>,
     entries: usize,
 }

@@ -48,7 +48,7 @@ pub(super) struct Achiever {
 #[derive(Debug, Clone)]
 pub(super) enum Gain {
     Constant(f64),
-    /// Constant and terms over the numbers of the state before the operator.
+    /// Constant and terms over the numbers of the evaluated state.
     Linear(f64, Vec<(NumericId, f64)>),
     /// A single application is assumed to suffice.
     Unlimited,

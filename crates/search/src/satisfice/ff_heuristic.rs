@@ -234,8 +234,8 @@ impl FfHeuristic {
             }
             let operator = relaxation.operators[node as usize];
             if operator != NO_OPERATOR {
-                // An operator is counted once, or `times` times for each numeric comparison that needs
-                // several applications.
+                // An operator is counted when it is first needed, and again for each further numeric
+                // comparison that needs several applications, each time with its number of applications.
                 if !self.in_plan[operator as usize] || times > 1 {
                     let price = prices[operator as usize];
                     total = total.saturating_add(price.saturating_mul(times)).min(MAX_COST);

@@ -103,7 +103,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         self.phase >= SEARCH_SEQUENCE.len()
     }
 
-    /// Returns `true` if `improve` was called and may find a better plan than the one that it received last.
+    /// Returns `true` if `improve` was called and its search has not ended.
     pub fn can_improve(&self) -> bool {
         self.improvement.as_ref().is_some_and(|improvement| !improvement.has_ended())
     }
@@ -142,7 +142,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         let is_large = search.size() > self.limits.room() / MEMORY_SHARE;
         match outcome? {
             Outcome::Plan(plan) => {
-                // The last search continues with the cost of the plan as its limit.
+                // The next call resumes the last search, which may find a cheaper plan.
                 if !is_last {
                     self.next();
                 }
@@ -165,8 +165,8 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     }
 
     /// Searches for a plan that is cheaper than `plan`, with about `work` work units, by replacing parts of
-    /// the plan. If `plan` is not cheaper than the last plan of an earlier call, the search of that call is
-    /// resumed. Returns `None` if no cheaper plan was found. Subtracts the work done from `work`.
+    /// the plan. If an earlier call has received or returned a plan that is at most as expensive as `plan`, its
+    /// search is resumed. Returns `None` if no cheaper plan was found. Subtracts the work done from `work`.
     ///
     /// # Errors
     /// Fails if the deadline has passed or the interrupt flag is set.

@@ -51,7 +51,7 @@ pub(super) struct PlanImprovement<N> {
     has_improved: bool,
     current: Option<SegmentSearch<N>>,
     /// Unsuccessful searches, by the hash of first state, goal facts and weight: the number of times that the
-    /// limit on evaluated states was doubled.
+    /// limit on evaluated states was doubled, or the maximum if the search was exhausted.
     failures: FxHashMap<u64, u32>,
 }
 

@@ -149,7 +149,8 @@ impl<N: TaskNumber> Search<N> {
         search
     }
 
-    /// Returns the approximate memory use of states, nodes, landmarks and open lists, in 64-bit words.
+    /// Returns the approximate memory use of states, nodes, landmarks, open lists and novelty table, in 64-bit
+    /// words.
     pub(super) fn size(&self) -> usize {
         let nodes = self.nodes.len().saturating_mul(size_of::<Node<N>>() / 8);
         let states = self.store.size().saturating_add(nodes).saturating_add(self.reached.len());
@@ -303,8 +304,8 @@ impl<N: TaskNumber> Search<N> {
     }
 
     /// Applies a step up to `times - 1` times, while it remains applicable, and returns the last
-    /// node. The new states are stored but not evaluated. They are evaluated when another path
-    /// reaches them.
+    /// node. The new states are stored but not evaluated. They are evaluated when they are reached
+    /// again.
     fn jump(
         &mut self,
         context: &mut SearchContext<'_, N>,
@@ -346,7 +347,7 @@ impl<N: TaskNumber> Search<N> {
             at = node.parent;
         }
         steps.reverse();
-        // A cheaper path to a node of the plan may have been found since the goal was reached.
+        // A cheaper path to a node of the plan may have been found after its successor was stored.
         let cost = cost(context.task, &steps).unwrap_or_else(|| self.nodes[goal as usize].cost.clone());
         GroundPlan { steps, cost }
     }

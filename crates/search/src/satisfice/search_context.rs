@@ -36,8 +36,7 @@ pub(super) struct SearchContext<'a, N> {
     pub(super) status: LandmarkStatus,
     /// The h² mutexes; `None` if they are not computed yet, or their computation exceeded its limits.
     pub(super) pairs: Option<MutexPairs>,
-    /// Operator costs of the searches (all 1, and scaled as by [`SearchContext::operator_costs`]), once
-    /// computed.
+    /// Results of [`SearchContext::prices`], for unit costs and for scaled costs, once computed.
     prices: [Option<Arc<[u32]>>; 2],
     steps: Vec<Step<N>>,
     /// Index of the first step of each operator, followed by the number of steps.

@@ -17,7 +17,7 @@ pub(super) struct SegmentGoal {
     /// regression, all basic facts of the state in which the replaced segment ended.
     pub(super) facts: Vec<Fact>,
     suffix: Vec<GroundStep>,
-    /// `true` if the facts suffice: the suffix is executable in every state that has them.
+    /// `true` if the facts suffice: the suffix is a plan from every state that has them.
     is_complete: bool,
 }
 
@@ -105,7 +105,8 @@ mod tests {
                 for state in &reached {
                     let is_plan = pass(&task, state, &plan.steps[end..]).is_some();
                     let holds = goal.holds(&task, state);
-                    // With derived variables or conditional effects, the goal requires a state that is equal.
+                    // With derived variables or conditional effects, the goal requires all basic facts of the
+                    // end state.
                     let is_regressive = goal.is_complete || task.axioms.is_empty();
                     let is_regressive = is_regressive
                         && plan.steps[end..]

@@ -3,8 +3,9 @@
 //!
 //! States with equal finite-domain variables are compared by cost and by numeric variables. If a higher value
 //! of a numeric variable is never worse (for example battery charge), a state dominates another state that
-//! costs at least as much and has no higher values. This is label setting for resource-constrained shortest
-//! paths \[1\]. The result is exact if the search ends before its limits and no number overflows.
+//! costs more, or as much with at least as many steps, and has no higher values. This is label setting for
+//! resource-constrained shortest paths \[1\]. The result is exact if the search ends before its limits and no
+//! number overflows.
 //!
 //! The open list of A\* is sorted by path cost plus heuristic value. Ties are broken by a lower bound on the
 //! number of steps, then by depth. A plan is optimal once no open node can lead to a cheaper plan. With the
@@ -36,13 +37,14 @@ use crate::search::symmetry::Orbits;
 
 /// Work units charged for an expansion: popping the node and finding the applicable operators.
 const EXPANSION_COST: u64 = 2_000;
-/// Work units charged for generating a successor: applying the operator and looking the state up.
+/// Work units charged for each combination of designs of an applicable operator: applying it and looking up the
+/// successor.
 const GENERATION_COST: u64 = 600;
 /// Length of a trial in evaluations. After each trial, the improving heuristic is dropped if it raised too few f values.
 const IMPROVING_TRIAL: u64 = 5_000;
 /// Divisor: the improving heuristic must raise at least 1/25 of the f values that it evaluates in a trial.
 const IMPROVING_SHARE: u64 = 25;
-/// Work units charged for each operator that the stubborn-set computation visits.
+/// Work units charged for each operator in the stubborn set.
 const STUBBORN_SET_COST: u64 = 10;
 
 /// Outcome of a search for an optimal plan.
@@ -65,7 +67,7 @@ pub struct SearchProblem<'a, N, E> {
     pub context: Context<'a, N>,
     pub bounds: &'a E,
     pub prepared: &'a SearchTask<N>,
-    /// Symmetries of interchangeable objects. If set, symmetric states count as equal.
+    /// Symmetries of interchangeable objects. If set, states with the same canonical state count as equal.
     pub orbits: Option<Arc<Orbits>>,
 }
 
@@ -111,7 +113,8 @@ pub struct AStar<'a, N, E> {
     /// `true` if states were dropped because a number overflowed. The search then proves nothing.
     states_dropped: bool,
     order: OpenListOrder,
-    /// More accurate heuristic that is evaluated only when a node is about to be expanded (lazy A\*).
+    /// Slower heuristic that is usually more accurate. It is evaluated only when a node is about to be
+    /// expanded (lazy A\*).
     pub(super) lazy_heuristic: Option<Box<dyn LazyHeuristic<N>>>,
     /// Heuristic that improves during the search, shared with other searches. It is evaluated whenever a node is
     /// about to be expanded, before the lazy heuristic.
@@ -122,8 +125,8 @@ pub struct AStar<'a, N, E> {
     /// Work units without those of the lazy heuristic.
     own_work: u64,
     sharing: usize,
-    /// Lower bound on the cost of every plan; `None` before the first expansion. Not a bound in greedy search,
-    /// or if `states_dropped` is `true`.
+    /// Lower bound on the cost of every plan, or the upper bound if this is lower. `None` until a node was taken
+    /// from the open list. Not a bound in greedy search, or if `states_dropped` is `true`.
     bound: Option<N>,
     is_interrupted: bool,
     pub(super) patience: OutOfMemoryPolicy,
@@ -135,7 +138,7 @@ pub struct AStar<'a, N, E> {
     /// Number of steps of the incumbent if this search found it. Nodes of equal cost must lead to shorter
     /// plans.
     fewest: Option<u32>,
-    /// Number of stored states at which the search first forecasts whether its memory suffices.
+    /// Number of stored states at which the first sample for the memory forecast is taken.
     first_look: usize,
     /// Lower bound on the plan cost at each doubling of the number of stored states.
     progress: Vec<N>,
@@ -245,7 +248,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             if self.can_stop_at(total, *least) {
                 return Some(self.outcome_when_exhausted());
             }
-            // The callback is called only if a value has changed.
+            // Within a call of this method, the callback is called again only if a value has changed.
             let is_reported = |(limit, bound): &(Option<N>, N)| *limit == self.limit && *bound == *total;
             if !self.states_dropped && !reported.as_ref().is_some_and(is_reported) {
                 hear(self.limit.as_ref(), total);
@@ -285,7 +288,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// Evaluates the more accurate heuristics for a node that is about to be expanded. Returns the key of the node,
+    /// Evaluates the improving and the lazy heuristic for a node that is about to be expanded. Returns its key,
     /// or `None` if the node was pruned or reinserted with a higher key.
     fn reevaluate(&mut self, id: u32, key: NodeKey<N>) -> Option<NodeKey<N>> {
         if let Some(improving) = &self.improving_heuristic {
@@ -364,7 +367,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
     }
 
     /// Lowers the upper bound on the plan cost to `cost`, unless it is already lower. Plans with exactly this
-    /// cost are not pruned.
+    /// cost are not pruned. The search must not have found a plan.
     pub(super) fn set_upper_bound_inclusive(&mut self, cost: &N) {
         if self.limit.as_ref().is_none_or(|limit| cost < limit) {
             self.limit = Some(cost.clone());
@@ -503,9 +506,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         Ok(())
     }
 
-    /// Stores the successor in `self.next`, unless it is dominated, a dead end, or cannot improve the incumbent,
-    /// or its f value overflows. A stored goal state becomes the incumbent. The derived variables of the
-    /// successor need not be evaluated. `through` is the f value of the parent.
+    /// Adds the state `self.next` to the registry and the open list, unless it is dominated, a dead end, or cannot
+    /// improve the incumbent, or its f value overflows. A stored goal state becomes the incumbent. The derived
+    /// variables of the state need not be evaluated. `through` is the f value of the parent.
     fn push(&mut self, cost: N, through: &N, origin: ParentLink) {
         self.statistics.generated = self.statistics.generated.saturating_add(1);
         if self.exceeds_upper_bound(&cost) {

@@ -243,8 +243,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Computes the pairs of facts that a reachable state may contain. Returns `None` if the work
-    /// limit is reached.
+    /// Computes the pairs of facts that a state may contain that is reachable without useless operators.
+    /// Returns `None` if the work limit is reached.
     fn forwards(
         &mut self,
         rules: &[Rule],
@@ -302,8 +302,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// Computes the pairs in `forwards` that a state may contain from which the goal is reachable.
-    /// Returns `None` if the work limit is reached.
+    /// Computes the pairs in `forwards` that a state may contain from which the goal is reachable without
+    /// useless operators. Returns `None` if the work limit is reached.
     fn backwards(
         &mut self,
         rules: &[Rule],

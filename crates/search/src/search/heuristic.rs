@@ -12,13 +12,13 @@ pub trait Heuristic<N> {
     /// Returns the heuristic value of a state, or `None` if the goal is proved unreachable.
     fn estimate(&self, state: &State<N>) -> Option<N>;
 
-    /// Returns a more accurate but slower heuristic, if one is available.
+    /// Returns a slower heuristic that is usually more accurate, if one is available.
     fn sharper(&self, _: &Task<N>) -> Option<Box<dyn LazyHeuristic<N>>> {
         None
     }
 
-    /// Returns a heuristic that improves during the search, if one is available. `max_work` limits the effort
-    /// for its computation, in work units.
+    /// Returns a heuristic that improves during the search, if one is available. `max_work` limits most of the
+    /// effort for its computation, in work units.
     fn improving(&self, _: Context<'_, N>, _max_work: u64) -> Option<Box<dyn LazyHeuristic<N>>> {
         None
     }

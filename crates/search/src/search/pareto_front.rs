@@ -44,7 +44,7 @@ struct Region {
 #[derive(Default)]
 pub(super) struct Front {
     regions: Vec<Region>,
-    /// Maximum number of labels in a leaf, unless all its labels have equal numbers.
+    /// Maximum number of labels in a leaf, unless all its labels are equally good by each criterion.
     most: usize,
 }
 
@@ -133,7 +133,7 @@ impl Front {
         self.split(at, criteria);
     }
 
-    /// Splits a leaf recursively, until each leaf has at most `most` labels or its labels have equal numbers.
+    /// Splits a leaf recursively, until each leaf has at most `most` labels or its labels are equally good.
     fn split(&mut self, from: u32, criteria: &impl Criteria) {
         let mut stack = vec![from];
         while let Some(at) = stack.pop() {
@@ -188,8 +188,8 @@ fn widen(region: &mut Region, numbers: &[u32], criteria: &impl Criteria) {
     }
 }
 
-/// Returns the criterion and the number that split the labels most evenly; `None` if all labels
-/// have equal numbers.
+/// Returns the criterion whose median splits the labels most evenly, and the median; `None` if all labels are
+/// equally good.
 fn middle(labels: &[u32], criteria: &impl Criteria) -> Option<(usize, u32)> {
     let mut label_numbers = Vec::new();
     let mut columns: Vec<Vec<u32>> = Vec::new();
@@ -214,8 +214,8 @@ fn middle(labels: &[u32], criteria: &impl Criteria) -> Option<(usize, u32)> {
     best.map(|(_, criterion, number)| (criterion, number))
 }
 
-/// Returns the median of the numbers in `column`. If it equals the worst number, returns the worst
-/// of the better numbers, or `None` if all numbers are equal.
+/// Returns the median of the numbers in `column`. If it is as bad as the worst number, returns the worst of
+/// the better numbers, or `None` if all numbers are equally good.
 fn median(criterion: usize, mut column: Vec<u32>, criteria: &impl Criteria) -> Option<u32> {
     column.sort_by(|one, other| {
         match (criteria.is_as_good(criterion, *one, *other), criteria.is_as_good(criterion, *other, *one)) {

@@ -42,7 +42,7 @@ const PAIR_LIMIT: usize = 50_000_000;
 #[derive(Debug, Clone)]
 struct Label {
     state: State,
-    /// Last design of each function, if the function was used.
+    /// Last design of each function, in the plan or before it; `None` if it is not known.
     designs: Vec<Option<ObjectId>>,
     cost: Int,
     steps: usize,
@@ -121,7 +121,7 @@ type Choices = Option<Vec<Choice>>;
 #[derive(Default)]
 struct Labels {
     all: Vec<Label>,
-    /// Merits of the non-dominated labels, by the key of [`Label::write_front_key`].
+    /// Merits of the non-dominated labels except the first, by the key of [`Label::write_front_key`].
     fronts: FxHashMap<Box<[u32]>, Vec<Merits>>,
 }
 
@@ -299,7 +299,7 @@ impl Ties<'_> {
     }
 
     /// Returns the combinations of designs of an operator. Returns `None` if there are too many, or if the
-    /// computation was interrupted; only the former result is cached.
+    /// computation was interrupted. The result is cached unless the computation was interrupted.
     fn choices(&self, operator: OperatorId) -> Option<&[Choice]> {
         let choices = &self.choices.as_ref().unwrap_or(&self.prepared.choices)[operator.index()];
         if choices.get().is_none() {
@@ -366,7 +366,7 @@ impl Ties<'_> {
         let mut next = self.next.borrow_mut();
         next.clone_from(&label.state);
         operator.apply(&label.state, &choice.designs, &mut next)?;
-        // The bounds read only basic variables.
+        // The bounds read no derived variables, which are not evaluated yet.
         if cost + self.bounds.estimate(&next)? > self.cost || !self.is_in_time(&next, self.steps - steps) {
             return None;
         }

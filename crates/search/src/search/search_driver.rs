@@ -7,9 +7,9 @@
 //! provides an upper bound. Then two A\* searches alternate: both use pattern databases, the second also LM-cut.
 //! After some work, they share online cost partitioning; computing its abstractions earlier would take longer
 //! than most proofs. The LM-cut search first gets a quarter of the other's work, and later the same work. After
-//! much work, a search whose lower bound lags behind that of the other gets half of the work. The result of the
-//! search that finishes first is returned. Work is counted in units instead of time, so the result without a
-//! time limit is deterministic.
+//! much work, a search whose lower bound lags behind that of the other gets half of the work, and is finally
+//! abandoned. The result of the search that finishes first is returned. Work is counted in units instead of
+//! time, so the result without a time limit is deterministic.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -39,12 +39,12 @@ pub const STATE_LIMIT: usize = 400_000;
 const LEAST: usize = 100;
 /// Number of work units that correspond to one stored state in the budgets of alternating searches.
 const WORK_PER_STATE: u64 = 2_500;
-/// Budget of a round of the alternating searches, in work units, from which on a lagging search is abandoned.
+/// Work units of each alternating search, counted from its start, from which on a lagging search is abandoned.
 const ABANDON_WORK: u64 = 100_000_000_000;
 
-/// Searches for an optimal plan. All operators must have non-negative costs. Ends without a proof if memory
-/// does not suffice (by a forecast or in fact), if the deadline passes or the run is interrupted, or if an
-/// operator has too many combinations of designs.
+/// Searches for an optimal plan. All operators must have non-negative costs. Ends without a proof, for example,
+/// if memory does not suffice (by a forecast or in fact), if the deadline passes, or if there are too many
+/// combinations of designs.
 pub fn search(context: Context<'_>, bounds: &Bounds) -> SearchOutcome {
     let Ok(Some(prepared)) = SearchTask::new(context) else { return SearchOutcome::Unknown(None) };
     let space = || SearchProblem { context, bounds, prepared: &prepared, orbits: None };
@@ -196,8 +196,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         self.searches.iter().any(|search| search.patience != OutOfMemoryPolicy::Needed)
     }
 
-    /// Sets the cost of a plan that another component found. More expensive nodes are pruned, and a search
-    /// ends once its lower bound reaches this cost.
+    /// Sets the cost of a plan that another component found. More expensive nodes are pruned, and a search that
+    /// is already running ends once its lower bound reaches this cost.
     pub fn set_upper_bound(&mut self, cost: &N) {
         self.searches.iter_mut().for_each(|search| search.set_upper_bound(cost.clone()));
     }
@@ -289,8 +289,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         self.searches.is_empty().then(|| SearchOutcome::Unknown(self.best.clone()))
     }
 
-    /// Adds the heuristic that improves during the search to all searches. Its precomputation may cost at most
-    /// half of `work`, the budget of this round.
+    /// Adds the heuristic that improves during the search to all searches. The work for its Cartesian abstractions
+    /// is limited to about half of `work`.
     fn add_improving_heuristic(&mut self, work: u64) {
         self.has_improving = true;
         let SearchProblem { context, bounds, .. } = self.space;
@@ -358,7 +358,7 @@ pub enum NoLabels {
     States,
     /// An operator, or all operators together, have too many combinations of designs.
     Combinations,
-    /// The search has proved nothing, for example because a number became too large.
+    /// The search has not confirmed the given cost, for example because a number became too large.
     Inconclusive,
 }
 

@@ -1,9 +1,9 @@
 //! State registry and closed list of A\*, with packed states.
 //!
 //! Finite-domain values are packed into as few bits as they need. Equal numbers are stored once, and states
-//! refer to them by index. A *place* is the combination of the finite-domain values and the numbers that must
-//! be equal for dominance. A hash table finds the place of a state. The states of a place differ only in
-//! cost, in comparable numbers, and in numbers that are ignored. Those that no other state of the place
+//! refer to them by index. A *place* is the combination of the finite-domain values (with symmetries, the
+//! canonical ones) and the numbers that must be equal for dominance. A hash table finds the place of a state.
+//! The states of a place differ in cost, steps, and other numbers. Those that no other state of the place
 //! dominates form its Pareto front.
 
 use std::hash::{Hash, Hasher};
@@ -92,7 +92,7 @@ pub(super) struct StateRegistry<N> {
     key: Vec<u32>,
     /// Compared numbers of the state that is looked up.
     own: Vec<u32>,
-    /// If set, symmetric states count as equal, and the keys are canonical.
+    /// If set, the keys are canonical, and states with the same canonical state count as equal.
     orbits: Option<Arc<Orbits>>,
     /// With symmetries: the packed original values of each node.
     plain: Vec<u32>,

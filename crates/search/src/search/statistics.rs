@@ -7,7 +7,7 @@ use task::plan::solution::Statistics;
 pub struct SearchStatistics {
     /// Number of expanded states.
     pub expanded: u64,
-    /// Number of generated successors.
+    /// Number of generated states.
     pub generated: u64,
     /// Number of evaluated states.
     pub evaluated: u64,

@@ -59,7 +59,7 @@ pub(super) struct StubbornSetPruning {
     can_be_applied: Vec<bool>,
     open: Vec<u32>,
     all: Vec<u32>,
-    /// For each fact: whether all operators that set it are in the stubborn set.
+    /// For each fact: `true` if all operators that may set it have been added to the stubborn set as a group.
     is_set: Vec<bool>,
     set: Vec<u32>,
     /// Number of applicable operators that are not in the stubborn set.
@@ -73,7 +73,7 @@ pub(super) struct StubbornSetPruning {
 
 impl Stubborn {
     /// Prepares the computation of stubborn sets. Returns `None` if the task has numeric or derived
-    /// variables.
+    /// variables, or too many facts.
     pub(crate) fn new<N>(task: &Task<N>) -> Option<Self> {
         if !task.axioms.is_empty() || !task.initial.numbers.is_empty() || task.basic < task.variables.len() {
             return None;

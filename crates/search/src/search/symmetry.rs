@@ -1,5 +1,5 @@
-//! Symmetry reduction: a canonical state represents all states that differ only by exchanges of
-//! interchangeable objects.
+//! Symmetry reduction: a canonical state represents states that differ only by exchanges of interchangeable
+//! objects.
 //!
 //! Orbit search \[1\]: if an exchange of objects maps the operators and the goal to themselves, every plan
 //! from a state is mapped to a plan of equal cost from the image of the state. A state is made canonical by

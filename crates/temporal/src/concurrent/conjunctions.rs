@@ -2,9 +2,9 @@
 //!
 //! A relaxed plan deletes nothing, so an action that deletes a fact needed later looks useful even
 //! if nothing adds the fact again. Up to work limits, the relaxed task gets, for each such fact,
-//! conjunctions of this fact and each proposition that is needed at the same time. Only rules that
-//! keep the fact achieve these conjunctions. They are conjunctions of two facts as in the task Π^C
-//! \[1\], for a few selected facts.
+//! conjunctions of this fact with propositions that are needed at the same time and that rules which
+//! delete the fact help to achieve. Only rules that keep the fact achieve these conjunctions. They
+//! are conjunctions of two facts as in the task Π^C \[1\], for a few selected facts.
 //!
 //! \[1\] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through
 //! explicitly represented conjunctions, JAIR 50, 2014.

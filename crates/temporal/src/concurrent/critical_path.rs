@@ -26,7 +26,7 @@ use crate::concurrent::time_number::TimeNumber;
 #[derive(Debug, Clone, Copy)]
 struct Reader<T: TimeNumber> {
     rule: u32,
-    /// Least time from the happening that adds the proposition to the rule.
+    /// Least time between the happening that adds the proposition and the happening of the rule.
     delay: T,
     /// Instance whose over-all condition has the proposition. `None` if the rule itself requires it.
     over_all_of: Option<u32>,

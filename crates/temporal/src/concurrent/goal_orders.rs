@@ -51,7 +51,7 @@ const MAX_ESCAPE: usize = 100;
 /// Upper limit on the number of best-first searches per goal. An order that needs more is dropped. Otherwise,
 /// this search would take too much time from the other searches on tasks with conflicting goals.
 const MAX_ESCAPES: usize = 3;
-/// Number of orders after which the search ends if it has found no plan.
+/// Number of failed orders after which the search ends if it has found no plan.
 const MAX_FAILURES: usize = 12;
 /// Work (see `GoalOrders::work`) without a better plan after which the search ends.
 const MAX_STALE: u64 = 200_000;
@@ -93,7 +93,7 @@ pub(super) struct GoalOrders<'a, T: TimeNumber = Int> {
     relaxation: TimedRelaxation<'a, T>,
     relaxed: &'a TemporalRelaxation,
     goals: Vec<Fact>,
-    /// Orders that are decoded before local search begins, last one first.
+    /// Orders that are decoded before further neighbours, last one first.
     initial: Vec<Vec<usize>>,
     /// Metric and makespan of the last plan whose order of goals was added to `initial`, or of the last plan
     /// that this search returned.

@@ -1,5 +1,5 @@
 //! Interleaves the exact search with incomplete ones (greedy search, goal orders, sequential plans). The
-//! budgets double in each round, and begin again when the incomplete searches restart.
+//! budgets double in each round. They begin again when all incomplete searches have ended and restart.
 //!
 //! Small tasks are solved by the exact search alone, before the others begin. After that, the best
 //! plan of any search is the incumbent.
@@ -23,7 +23,7 @@ use crate::concurrent::temporal_relaxation::TemporalRelaxation;
 use crate::concurrent::temporal_task::TemporalTask;
 use crate::concurrent::time_number::TimeNumber;
 
-/// Expansions of the exact search per unit of work of the greedy search, once a plan is known.
+/// Work units of the exact search per generated successor of the greedy search, once a plan is known.
 const EXACT_BUDGET: usize = 4;
 /// Number of first rounds in which the search for sequential plans runs even if a plan is known. In later
 /// rounds it runs only until a plan is known. Its best plan gives an upper bound on the metric.
@@ -188,7 +188,7 @@ fn claimed<T: TimeNumber>(
 }
 
 /// Returns `true` if the exact search is incomplete, but the incumbent reaches the lower bound
-/// `root`.
+/// `root` on the whole metric.
 fn is_best<T: TimeNumber>(concurrent: &TemporalTask<T>, search: &Search<'_, T>, root: T) -> bool {
     !concurrent.is_exact
         && concurrent.is_whole

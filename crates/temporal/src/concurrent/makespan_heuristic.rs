@@ -59,7 +59,7 @@ impl<T: TimeNumber> Estimate<T> {
         reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`, and a variable has fewer than 2^32 values"
     )]
     pub(super) fn left(&self, state: &State, clocks: &SimpleTemporalNetwork<T>) -> Option<RemainingTime<T>> {
-        // A plan ends with an action, so pending timed literals alone do not delay its end.
+        // A plan ends with an action, and not before the timed literals that have taken place.
         let mut remaining = RemainingTime { makespan: clocks.latest().max(clocks.floor()), sum: T::ZERO };
         for open in clocks.opens() {
             let end = clocks.start(open) + open.duration;

@@ -86,8 +86,8 @@ const PRECISION: Int = 1_000_000;
 /// actions. Interfering happenings are at least `separation` apart, in the domain's time unit.
 ///
 /// # Errors
-/// Fails if a construct is unsupported (with its place), `separation` is not positive, a number of the metric has
-/// no initial value, a number overflows, or a limit is reached.
+/// Fails, for example, if a construct is unsupported (with its place), `separation` is not positive, a number of
+/// the metric has no initial value, a number overflows, or a limit is reached.
 pub fn ground_concurrent(
     domain: &Domain,
     problem: &Problem,
@@ -270,7 +270,7 @@ fn is_fixed(domain: &Domain) -> bool {
     })
 }
 
-/// Returns `true` if an end effect of the action assigns a value that mentions `?duration`.
+/// Returns `true` if the value of a numeric end effect of the action mentions `?duration`.
 fn mentions_duration(domain: &Domain, action: u32) -> bool {
     let Some(action) = domain.actions.get(action as usize) else { return false };
     let ActionBody::Durative { effects, .. } = &action.body else { return false };

@@ -18,7 +18,7 @@ pub(super) struct Rule {
     /// [`TemporalRelaxation::admissible`](super::temporal_relaxation::TemporalRelaxation::admissible).
     pub(super) over_all: Vec<Proposition>,
     /// Facts that certainly hold after the rule, because the happening sets their variables. All other values of these
-    /// variables are deleted. Empty for clauses and derived facts.
+    /// variables are deleted. Empty for clauses, derived facts, and copies by [`Rule::with`].
     pub(super) sets: Vec<Proposition>,
     pub(super) raises: Vec<NumericEffect>,
     pub(super) weight: u32,
@@ -46,5 +46,5 @@ impl Rule {
 }
 
 /// Index of a numeric condition, and the amount that a rule adds to its expression. The amount is
-/// `None` if it depends on the state.
+/// `None` if it depends on the state or overflows.
 pub(super) type NumericEffect = (u32, Option<Int>);

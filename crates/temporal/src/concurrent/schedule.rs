@@ -68,8 +68,9 @@ pub(super) fn durations<T: TimeNumber>(concurrent: &TemporalTask<T>, sequence: &
     durations
 }
 
-/// Constraints of a sequence. Sets `times` of the happenings to the times of the timed initial
-/// literals before them, and appends the times of the other nodes.
+/// Returns the constraints of a sequence. Sets the entry of each happening in `times` to a lower bound:
+/// the time of the last timed initial literal up to and including the happening, or 0. Appends an entry
+/// for each other node (see [`Bound`]).
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the first happening is together with none; durations have at most `TIME_BITS` bits"

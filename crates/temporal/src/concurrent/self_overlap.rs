@@ -264,13 +264,13 @@ impl<T: TimeNumber> Index<'_, T> {
     }
 
     /// Facts that are the only useful effects of the run that the end `id` completes. Returns
-    /// `None` if the run has other useful effects or `id` is not an end.
+    /// `None` if the run may have other useful effects or `id` is not an end.
     fn purpose(&self, id: OperatorId, known: &RelevanceContext<'_, T>) -> Option<Vec<Fact>> {
         let Role::End(instance) = self.happenings[id.index()].role else { return None };
         let instance = &self.instances[instance as usize];
         let [start, end] = [instance.start, instance.end].map(|id| &self.task.operators[id.index()]);
         let wanted = |operator: &Operator| -> Vec<Fact> {
-            // A fact of a variable with two values only marks the instance as running.
+            // A variable that only marks the instance as running has two values.
             let is_own = |fact: &Fact| {
                 let is_alone = self.task.variables[fact.variable.index()].values.len() == 2;
                 is_alone && instance.under_way.is_some_and(|running| running.variable == fact.variable)
@@ -307,7 +307,7 @@ impl<T: TimeNumber> Index<'_, T> {
     }
 
     /// Returns `true` if a run of `own` that starts during another run of `own` certainly has the same
-    /// duration as that run.
+    /// duration as that run, and the start changes no other number.
     fn lasts_as_long(&self, own: &Instance<T>, start: &Operator, invariant: &Invariant) -> bool {
         start.numeric_effects.iter().all(|effect| {
             let mut numbers =
@@ -316,8 +316,8 @@ impl<T: TimeNumber> Index<'_, T> {
         })
     }
 
-    /// Returns `true` if no happening during a run, other than those of `own`, reads or sets the
-    /// variable, and no axiom reads it.
+    /// Returns `true` if nothing but the starts and ends of `own` certainly reads or sets the variable
+    /// during a run.
     fn is_hidden(
         &self,
         own: &Instance<T>,

@@ -2,12 +2,12 @@
 //!
 //! The times of a sequence of happenings and the constraints between them form a simple temporal network. A
 //! later happening adds lower bounds: it takes place at or after an earlier time, or at least the separation
-//! after it. The network therefore keeps only the latest time of each kind of access to each atom. Upper
-//! bounds come only from timed initial literals, which earlier happenings must not follow. Happenings that
-//! must be simultaneous share a *time point*. Starts of running actions are time points that can still be
-//! delayed, together with the happenings that depend on them, so that an end meets its constraints. An end
-//! fixes its time point at the earliest possible time. Happenings that do not interfere are not ordered by
-//! their position in the sequence \[2\].
+//! after it. The network therefore keeps only the latest time of each kind of access. Upper bounds come
+//! only from timed initial literals, which earlier happenings must not follow. Happenings that must be
+//! simultaneous share a *time point*. Starts of running actions are time points that can still be delayed,
+//! together with the happenings that depend on them, so that an end meets its constraints. A time point
+//! that is no longer needed is fixed at the earliest possible time. Happenings that do not interfere are
+//! not ordered by their position in the sequence \[2\].
 //!
 //! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each a duration plus the
 //! separation, which have at most [`TimeNumber::TIME_BITS`] bits. Missing upper bounds
@@ -24,7 +24,8 @@ use task::number::{Int, dense};
 use crate::concurrent::time::{TimeExpression, TimePoint, place};
 use crate::concurrent::time_number::TimeNumber;
 
-/// Id of an access kind: a way of accessing (such as read or delete) one atom, number or design.
+/// Id of an access kind: a way of accessing (such as read or delete) one atom, number or design, or the end of
+/// one action.
 pub(super) type Key = u32;
 
 /// A running action. The action starts `offset` after its time point `float`.
@@ -51,8 +52,8 @@ struct Start<T: TimeNumber = Int> {
 pub(super) struct SimpleTemporalNetwork<T: TimeNumber = Int> {
     /// Time of the latest access of each kind, sorted by key.
     entries: Vec<(Key, TimeExpression<T>)>,
-    /// Time of the latest change of each variable, sorted by variable. Variables that never changed
-    /// have no entry.
+    /// Time of the latest change of each goal variable and guard, sorted by variable. Other variables
+    /// and those that never changed have no entry.
     changed: Vec<(u32, TimeExpression<T>)>,
     floats: Vec<Start<T>>,
     /// Running actions, sorted by instance. Runs of one instance are in the order of their starts,
@@ -168,7 +169,7 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
     }
 
     /// Earliest possible time of the latest change of a variable. Returns `None` if the variable
-    /// never changed.
+    /// never changed, or is neither a goal variable nor a guard.
     pub(super) fn changed(&self, variable: u32) -> Option<T> {
         self.change(variable).map(|time| time.base)
     }

@@ -76,7 +76,7 @@ pub(super) struct Store<'a, T: TimeNumber = Int> {
     table: HashTable<u32>,
     nodes: Vec<Node<T>>,
     bytes: usize,
-    /// Total number of stored nodes with which new nodes were compared for dominance.
+    /// Sum, over all calls of `add`, of the number of stored nodes that may dominate the state.
     pub(super) compared: usize,
 }
 

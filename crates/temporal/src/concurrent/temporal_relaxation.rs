@@ -35,7 +35,8 @@ pub(super) struct TemporalRelaxation {
     pub(super) first: Vec<Proposition>,
     pub(super) propositions: usize,
     pub(super) needs: Lists,
-    /// Propositions that must hold from the start of an action to the rule of its end. Empty for other rules; see [`Rule`].
+    /// Propositions that must hold from the start of an action to the rule of its end (see [`Rule`]). Empty for
+    /// other rules, and in the inadmissible relaxation.
     pub(super) over_all: Lists,
     /// Number of conditions of each rule.
     pub(super) unmet: Vec<u32>,

@@ -235,7 +235,7 @@ impl<T: TimeNumber> TemporalTask<T> {
     }
 
     /// Computes `guards` and, for each happening, the variables that it sets (`sets`). Only guards
-    /// and variables of the goal are kept in `sets`.
+    /// and variables of the goal's facts are kept in `sets`.
     fn guard(&mut self, limits: &Limits) -> Result<(), Interrupted> {
         let mut common: Vec<Option<Vec<u32>>> = vec![None; self.guards.len()];
         // A run may end before another run that precedes it in the sequence has begun. So variables

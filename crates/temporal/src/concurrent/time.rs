@@ -75,8 +75,8 @@ impl<T: TimeNumber> TimeExpression<T> {
         Some(self.lags.remove(position).1)
     }
 
-    /// Returns `true` if this time is at least `by` before the time `other`, for all values of the
-    /// time points.
+    /// Returns `true` if this time is certainly at least `by` before the time `other`, for all values
+    /// of the time points.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of fewer than 2^32 times fit, see `TimeNumber::TIME_BITS`"

@@ -1,9 +1,8 @@
-//! Number types of times: 128-bit integers, or 512-bit integers if a common unit of all times needs more
-//! bits.
+//! Number types of times: 128-bit integers, or 512-bit integers if the times or the metric need more bits.
 //!
 //! Twelve distinct prime speeds in durations `(/ (distance ?a ?b) (speed ?r))` can have a common denominator
-//! of more than 80 bits. Times are never rounded, so such tasks are planned with wider integers. The searches
-//! are generic over the number type: tasks with small numbers pay nothing.
+//! of more than 80 bits. The times of a task must be exact, so such tasks are planned with wider integers.
+//! The searches are generic over the number type: tasks with small numbers pay nothing.
 
 use std::fmt::Debug;
 use std::hash::Hash;

@@ -1,11 +1,11 @@
 //! Relaxed plans with times: the soonest way to reach some facts if nothing is deleted.
 //!
 //! A rule fires when its last condition holds (h^max over time). The end of an action fires a duration after
-//! its start, and timed initial literals at their time. The facts of a state hold from the times at which
-//! they were achieved, so objects that are free early, such as the robot that finishes first, achieve a fact
-//! sooner. Each proposition is supported by the rule that adds it first; among these, by one with the smaller
-//! relaxed plan. The actions are sorted by their latest start, as in critical path scheduling, so the longest
-//! chain is executed first.
+//! its start, and timed initial literals at their time. If the time at which a fact of the state was achieved
+//! is recorded, the fact holds from this time. So objects that are free early, such as the robot that finishes
+//! first, achieve a fact sooner. Each proposition is supported by the rule that adds it first; among these, by
+//! one with the smaller relaxed plan. The actions are sorted by their latest start, as in critical path
+//! scheduling, so the longest chain is executed first.
 //!
 //! Similar relaxed plans guide Sapa \[1\].
 //!
@@ -30,15 +30,15 @@ use crate::concurrent::time_number::TimeNumber;
 /// A time of the relaxation. Times only guide the search, so larger ones saturate.
 type Time = i64;
 
-/// Durations are rounded down so that they have at most this number of bits. Sums of thousands of them then
-/// fit.
+/// Constant times are rounded down so that they have at most this number of bits. Sums of thousands of them
+/// then fit.
 const TIME_BITS: u64 = 48;
 const NEVER: Time = Time::MAX;
 const MAX_REPETITIONS: u32 = 8;
 
 #[derive(Debug, Clone)]
 pub(super) struct TimedRelaxedPlan {
-    /// Time at which the last target holds.
+    /// Time at which the last target holds, in the unit of the relaxation.
     pub(super) finish: i64,
     /// Starts, actions without duration, and timed initial literals, sorted by the latest time at which they
     /// must happen. A happening occurs once for each of its repetitions, at most `MAX_REPETITIONS` times.
@@ -66,7 +66,7 @@ pub(super) struct TimedRelaxation<'a, T: TimeNumber = Int> {
     timings: Vec<Timing>,
     durations: Vec<Duration<T>>,
     separation: Time,
-    /// Times are rounded to multiples of 2^`shift` internal time units.
+    /// Times are in units of 2^`shift` internal time units, rounded down.
     shift: u64,
     /// For each proposition: the time from which it holds, and an estimate of the number of actions of its relaxed plan.
     values: Vec<(Time, u32)>,

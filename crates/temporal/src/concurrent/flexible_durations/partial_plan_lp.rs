@@ -49,8 +49,8 @@ pub(super) struct RunningAction {
     last: Option<Affine>,
 }
 
-/// Times, durations and metric contributions are expressions over the columns of the linear
-/// program.
+/// A happening of a partial plan. Its time, duration and metric contribution are expressions over
+/// the columns of the linear program.
 #[derive(Debug, Clone)]
 pub(super) struct Passed {
     pub(super) operator: OperatorId,
