@@ -35,8 +35,8 @@ pub struct PlanAnswer {
     /// Bound on the metric of every plan: no plan has a better metric; null if unknown.
     #[schemars(with = "Option<f64>")]
     lower_bound: Option<Value>,
-    /// Number of steps up to which formulas have excluded better plans; 0 if none was solved. For an
-    /// optimal plan, at least its number of steps.
+    /// Number of steps up to which better plans are excluded; 0 if no such number was determined. For
+    /// an optimal plan, at least its number of steps.
     horizon: usize,
     /// Proof that the plan is optimal, or that no plan exists; otherwise null. The status
     /// `unsolvable_within_horizon` can have none: the formulas up to `horizon` have no plan.

@@ -32,13 +32,16 @@ fn identifier(name: &str) -> Identifier {
     Identifier { name: Name::new(name), span: Span::default() }
 }
 
-/// Declares supertypes that are only mentioned. In parameters of predicates and functions, undeclared types
-/// restrict nothing and are dropped.
+/// Declares supertypes that are only mentioned. A parameter of a predicate or function with an undeclared type
+/// accepts all objects, so it gets no type.
 fn declare_types(domain: &mut Domain) {
     let hierarchy = TypeHierarchy::of(domain);
     for declaration in domain.predicates.iter_mut().chain(&mut domain.functions) {
         for parameter in &mut declaration.parameters {
-            parameter.r#type.alternatives.retain(|r#type| hierarchy.contains(&r#type.name));
+            let alternatives = &mut parameter.r#type.alternatives;
+            if alternatives.iter().any(|r#type| !hierarchy.contains(&r#type.name)) {
+                alternatives.clear();
+            }
         }
     }
     let mut declared: FxHashSet<Name> = FxHashSet::default();

@@ -305,11 +305,14 @@ impl<'a, N: Number> Pareto<'a, N> {
         choices.insert_range(..);
         let mut open = vec![choices];
         let mut remaining_nodes = 0..MAX_BRANCHES;
+        // Without some vertices, `lower_hull` gives no lower bound, so that a pruned node may have the optimum.
+        let mut is_complete = true;
         while let Some(allowed) = open.pop() {
             if remaining_nodes.next().is_none() {
                 return Ok(best.map(|best| (Bounded { lower: 0.0, ..best }, false)));
             }
             let vertices = self.vertices(Some(&allowed))?;
+            is_complete &= vertices.len() <= MAX_VERTICES;
             for vertex in &vertices {
                 let better = best.as_ref().is_none_or(|best| vertex.losses[0] < best.value);
                 if keeps(&vertex.losses[1], limit) && better {
@@ -334,7 +337,7 @@ impl<'a, N: Number> Pareto<'a, N> {
                 open.push(restricted);
             }
         }
-        Ok(best.map(|best| (Bounded { lower: lower.min(best.upper), ..best }, true)))
+        Ok(best.map(|best| (Bounded { lower: lower.min(best.upper), ..best }, is_complete)))
     }
 
     /// Returns the first state, in breadth-first order under `policy` before a target is reached,

@@ -146,7 +146,7 @@ class Plan(Answer):
         self.proof: dict[str, Any] | None = answer["proof"]
         """Proof of the status; ``None`` if there is none."""
         self.horizon: int = answer["horizon"]
-        """Number of steps up to which formulas have excluded better plans; 0 if none was solved."""
+        """Number of steps up to which better plans are excluded; 0 if no such number was determined."""
         self.makespan: Number | None = numbers.maybe(exact_numbers["makespan"])
         """End of the last action if actions may overlap, in the domain's time unit; otherwise ``None``."""
         names = [objective["minimize"] for objective in answer.get("objectives") or []]

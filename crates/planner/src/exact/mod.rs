@@ -90,7 +90,7 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
         (ExactOutcome::Optimal(plan), _) if !too_long(&plan) => {
             let lower = Some(metric(task, &plan.cost));
             let solution = answer(Status::Optimal, Some(show(&plan)), Some(Proof::Search));
-            Solution { lower_bound: lower, ..solution }
+            Solution { lower_bound: lower, horizon: plan.steps.len(), ..solution }
         }
         (ExactOutcome::Optimal(plan), Some(horizon)) => within(context, horizon, &plan.cost),
         (ExactOutcome::Unknown(_, lower), Some(horizon)) => within(context, horizon, &lower),
@@ -107,12 +107,11 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
 /// the cost of all plans.
 fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
     let shorter = with_horizon(context.task, horizon);
-    let (status, plan, proof) = match explore(Context { task: &shorter, ..context }) {
-        ExactOutcome::Optimal(plan) | ExactOutcome::Unknown(Some(plan), _) => {
-            (Status::Feasible, Some(plan), None)
-        }
-        ExactOutcome::Known(solution) => (Status::UnsolvableWithinHorizon, None, solution.proof),
-        ExactOutcome::Unknown(None, _) => (Status::Unknown, None, None),
+    let (status, plan, proof, horizon) = match explore(Context { task: &shorter, ..context }) {
+        ExactOutcome::Optimal(plan) => (Status::Feasible, Some(plan), None, horizon),
+        ExactOutcome::Unknown(Some(plan), _) => (Status::Feasible, Some(plan), None, 0),
+        ExactOutcome::Known(solution) => (Status::UnsolvableWithinHorizon, None, solution.proof, horizon),
+        ExactOutcome::Unknown(None, _) => (Status::Unknown, None, None, 0),
     };
     let show = |plan: &GroundPlan<Rational>| decode(context, plan);
     let solution = answer(status, plan.as_ref().map(show), proof);

@@ -96,10 +96,10 @@ impl<N: Number> Vector<N> {
         match self.answer(state) {
             Answer::Finite(Quantity { exact: Some(exact), .. }) => Some((exact.clone(), exact)),
             Answer::Finite(quantity) => Some((
-                BigRational::from_float(quantity.lower)?,
-                // An infinite upper bound becomes the greatest double. Numbers with which values
-                // are compared are assumed to be smaller.
-                BigRational::from_float(quantity.upper).or_else(|| BigRational::from_float(f64::MAX))?,
+                // Infinite bounds become the greatest and the least double. Numbers with which values
+                // are compared are assumed to be between these.
+                BigRational::from_float(quantity.lower.max(f64::MIN))?,
+                BigRational::from_float(quantity.upper.min(f64::MAX))?,
             )),
             _ => None,
         }

@@ -5,7 +5,7 @@ use crate::prism::ast::{
     Command, Constant, Expr, Model, ModelKind, Module, Named, RewardItem, Rewards, Type, Update, Variable,
 };
 use crate::prism::expression::{Cursor, Read};
-use crate::prism::lexer::{Kind, tokens};
+use crate::prism::lexer::{Kind, Token, tokens};
 use crate::prism::rename;
 
 /// Parses a PRISM model.
@@ -37,9 +37,10 @@ pub fn parse(text: &str) -> Result<Model, Error> {
     };
     let mut problems = Vec::new();
     let mut kind = None;
+    let formulas = formulas(&tokens);
     while *cursor.peek() != Kind::End {
         let before = cursor.position();
-        if let Err(problem) = part(&mut cursor, &mut model, &mut kind, &mut problems) {
+        if let Err(problem) = part(&mut cursor, &mut model, &mut kind, &formulas, &mut problems) {
             problems.push(problem);
             skip(&mut cursor);
             // An error at a keyword consumes no token, so one is skipped to make progress.
@@ -80,6 +81,7 @@ fn part(
     cursor: &mut Cursor<'_>,
     model: &mut Model,
     kind: &mut Option<ModelKind>,
+    formulas: &[Named],
     problems: &mut Vec<Diagnostic>,
 ) -> Read<()> {
     let place = cursor.place();
@@ -99,7 +101,7 @@ fn part(
             model.globals.push(variable);
             return Ok(());
         }
-        "module" => return module(cursor, model, problems),
+        "module" => return module(cursor, model, formulas, problems),
         "rewards" => return rewards(cursor, model),
         "ctmc" | "stochastic" | "pta" | "pomdp" | "popta" | "smg" | "csg" | "idtmc" | "imdp" | "ma" => {
             cursor.advance();
@@ -156,6 +158,21 @@ pub fn constant_declaration(cursor: &mut Cursor<'_>) -> Read<Constant> {
     Ok(Constant { name, kind: kind.unwrap_or(Type::Int), value, place })
 }
 
+/// Returns the formulas of the whole text, without those that have errors. A module may be renamed above the
+/// formulas that it uses.
+fn formulas(tokens: &[Token]) -> Vec<Named> {
+    let mut cursor = Cursor::new(tokens);
+    let mut formulas = Vec::new();
+    while *cursor.peek() != Kind::End {
+        if cursor.is_word("formula") {
+            formulas.extend(named_expression(&mut cursor).ok());
+        } else {
+            cursor.advance();
+        }
+    }
+    formulas
+}
+
 fn named(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     let is_label = cursor.is_word("label");
     let named = named_expression(cursor)?;
@@ -203,7 +220,12 @@ fn variable(cursor: &mut Cursor<'_>) -> Read<Variable> {
     Ok(Variable { name, range, initial, place })
 }
 
-fn module(cursor: &mut Cursor<'_>, model: &mut Model, problems: &mut Vec<Diagnostic>) -> Read<()> {
+fn module(
+    cursor: &mut Cursor<'_>,
+    model: &mut Model,
+    formulas: &[Named],
+    problems: &mut Vec<Diagnostic>,
+) -> Read<()> {
     cursor.advance();
     let (name, place) = cursor.name("the name of a module")?;
     if cursor.take("=") {
@@ -225,7 +247,7 @@ fn module(cursor: &mut Cursor<'_>, model: &mut Model, problems: &mut Vec<Diagnos
             let text = format!("there is no module `{original}` above");
             return Err(Diagnostic::new("Q201", original_place, text));
         };
-        let module = rename::module(original_module, &name, place, &pairs, &model.formulas);
+        let module = rename::module(original_module, &name, place, &pairs, formulas);
         model.modules.push(module);
         return Ok(());
     }
