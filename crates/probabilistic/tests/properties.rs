@@ -73,6 +73,14 @@ fn agree(model: &str, question: &str, expected: &str) {
 }
 
 #[test]
+fn renamed_modules_expand_formulas_that_are_declared_below() {
+    let model = "mdp module a x:[0..1] init 0; [] free -> (x'=1); endmodule module b = a [x=y] endmodule
+        formula free = x=0;";
+    // If the guard of `b` were `x=0`, a run could end in the state x=1, y=0.
+    agree(model, "Pmin=? [ F y=1 ]", "1");
+}
+
+#[test]
 fn paths_and_rewards_of_a_chain_have_the_expected_values() {
     for (question, expected) in [
         ("P=? [ F<=4 \"b\" ]", "25/48"),
