@@ -198,8 +198,8 @@ fn functions_to_restore(
     functions
 }
 
-/// Adds the companion of each value of the functions `restored`. A function without a value has no companion either,
-/// so that both remain undefined.
+/// Adds to the initial state, for each value of a function in `restored`, the value of its companion function
+/// `metaplan_done_…`: the change in `applied`, or 0. An undefined function gets no companion value.
 fn state_changes(problem: &mut Problem, restored: &BTreeSet<Name>, applied: &BTreeMap<String, BigRational>) {
     let applied: BTreeMap<Vec<Name>, &BigRational> = applied
         .iter()

@@ -229,8 +229,8 @@ impl Mission {
         Err(messages.into())
     }
 
-    /// Returns the predicates that the knowledge base adds to a domain in PLANTA's form, which uses
-    /// undeclared names of the ontology. `None` for other missions.
+    /// Returns the predicates of the knowledge base and of numeric comparisons that complete a domain
+    /// in PLANTA's form. Includes those that the domain declares itself. `None` for other missions.
     pub fn completed_predicates(&self) -> Option<&HashSet<Name>> {
         self.planta.as_ref().map(Planta::known)
     }

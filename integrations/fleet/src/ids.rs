@@ -34,7 +34,8 @@ pub enum Membership {
     Unclear,
 }
 
-/// A text with the inclusive ranges of the numbers that follow it: in ascending order, and the merged one.
+/// The text before the numbers of ids, the inclusive ranges of the inserted numbers in ascending order, and the merged
+/// range. The merged range can also contain numbers that were not inserted.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Session(
     String,

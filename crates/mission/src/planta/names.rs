@@ -48,11 +48,33 @@ fn spelled(text: &str) -> String {
     text.chars().map(|letter| if allowed(letter) { letter } else { '_' }).collect()
 }
 
+/// Numeric datatypes of XSD.
+const NUMERIC_TYPES: [&str; 16] = [
+    "decimal",
+    "double",
+    "float",
+    "integer",
+    "nonNegativeInteger",
+    "positiveInteger",
+    "nonPositiveInteger",
+    "negativeInteger",
+    "long",
+    "int",
+    "short",
+    "byte",
+    "unsignedLong",
+    "unsignedInt",
+    "unsignedShort",
+    "unsignedByte",
+];
+
 /// Parses a name such as `0.25_decimal` as a number. `None` if the name is not of this form.
 pub(super) fn number(name: &Name) -> Option<Literal> {
     let (lexical, datatype) = name.as_str().rsplit_once('_')?;
+    // Names in PDDL have no case.
+    let datatype = NUMERIC_TYPES.iter().find(|known| known.eq_ignore_ascii_case(datatype))?;
     let namespace = &xsd::DECIMAL[..xsd::DECIMAL.len() - local_name(xsd::DECIMAL).len()];
-    let value = Literal::parse(lexical, Some(&format!("{namespace}{}", datatype.to_ascii_lowercase())), None);
+    let value = Literal::parse(lexical, Some(&format!("{namespace}{datatype}")), None);
     value.as_rational().is_some().then_some(value)
 }
 
@@ -87,5 +109,28 @@ impl Literals {
             let datatype = if matches!(value, Literal::Decimal(_)) { xsd::DECIMAL } else { value.datatype() };
             literal(&lexical, Some(datatype))
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{NUMERIC_TYPES, Name, number};
+
+    #[test]
+    fn numbers_of_all_datatypes_are_recognised_in_any_case() {
+        for datatype in NUMERIC_TYPES {
+            let lexical = if datatype.starts_with("negative") || datatype.starts_with("nonPositive") {
+                "-7"
+            } else {
+                "7"
+            };
+            for datatype in [datatype.to_owned(), datatype.to_ascii_lowercase()] {
+                let name = Name::new(&format!("{lexical}_{datatype}"));
+                assert!(number(&name).is_some(), "{name}");
+            }
+        }
+        for other in ["7", "7_string", "x_integer", "7_robot"] {
+            assert!(number(&Name::new(other)).is_none(), "{other}");
+        }
     }
 }

@@ -149,8 +149,8 @@ fn best<N: TaskNumber>(
     for new in candidates {
         let is_equal = |cost: &N, profile: &[N]| all && *cost == new.cost && profile == new.profile;
         let is_dominated = if monotone {
-            // With at most one numeric quantity, the last entry of the front has the highest value of all earlier
-            // combinations.
+            // With at most one numeric quantity, comparing with the last entry of the front suffices: no earlier
+            // combination has a higher value.
             let first_candidate = if new.profile.len() > 1 { 0 } else { front.len().saturating_sub(1) };
             let mut is_dominated = false;
             for old in &front[first_candidate..] {

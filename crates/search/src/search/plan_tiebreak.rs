@@ -121,7 +121,8 @@ type Choices = Option<Vec<Choice>>;
 #[derive(Default)]
 struct Labels {
     all: Vec<Label>,
-    /// Merits of the non-dominated labels except the first, by the key of [`Label::write_front_key`].
+    /// Merits of the non-dominated labels, by the key of [`Label::write_front_key`]. The start label
+    /// (`all[0]`) is not included.
     fronts: FxHashMap<Box<[u32]>, Vec<Merits>>,
 }
 

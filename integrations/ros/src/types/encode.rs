@@ -264,7 +264,7 @@ fn of_seconds(structure: &Structure, value: &Value) -> Result<serde_json::Map<St
         let hint = if is_time { ", or a number of seconds" } else { "" };
         return Err(format!("{value} is not a table with the fields of {}{hint}", structure.name));
     };
-    // The nanoseconds are never negative, even if the time is.
+    // The field `nanosec` is unsigned. For a negative time, `sec` is rounded down, and `nanosec` is added to it.
     let nanoseconds = (number * 1e9).round() as i64;
     let (seconds, nanoseconds) =
         (nanoseconds.div_euclid(1_000_000_000), nanoseconds.rem_euclid(1_000_000_000));
