@@ -235,7 +235,7 @@ fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str)
         // An earlier iteration may have blanked the entry that is reported as missing.
         let counts = is_new && (messages.is_empty() || !description.starts_with("missing field"));
         if counts {
-            let place = error.span().map(|span| line_and_column(text, span.start));
+            let place = error.span().map(|span| line_and_column(&remaining, span.start));
             let message =
                 Message::at("M104", name, place, description.to_owned() + &key_suggestion(description))
                     .with_source(text);
@@ -267,8 +267,8 @@ fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
         end = next.map_or(text.len(), |(at, _)| end + at);
     }
     let blank: String = text.get(begin..end)?.chars().map(|c| if c == '\n' { c } else { ' ' }).collect();
-    // A blank may have fewer bytes than the character that it replaces. Columns stay right, since
-    // whole lines are overwritten.
+    // Each character becomes one blank, so lines and columns stay as they are. Byte offsets change if a
+    // character has several bytes.
     let blanked = format!("{}{blank}{}", text.get(..begin)?, text.get(end..)?);
     (blanked != text).then_some(blanked)
 }

@@ -1,5 +1,5 @@
-//! Generates Rust types from the ROS definitions below `interfaces/`, with their type hashes, and embeds the
-//! definitions for types that are known at run time only.
+//! Generates Rust types from the ROS definitions below `interfaces/`, with their type hashes. Also embeds the texts
+//! of the definitions, in which the types that settings name are looked up at run time.
 
 #[path = "build/definition.rs"]
 mod definition;

@@ -119,7 +119,7 @@ enum EngineName {
     Auto,
     /// SAT solver only.
     Sat,
-    /// Search only.
+    /// Search. With `--horizon` and for a metric without a best value, SAT formulas as well.
     Search,
 }
 

@@ -168,7 +168,7 @@ pub(crate) fn unavailable(knowledge: &Knowledge, design: &str) -> Vec<Derivation
         return Vec::new();
     };
     let names = ["fd_realisability", "fd_available"].map(|name| {
-        [ontology::vocab::tomasys::NS, ontology::vocab::pddl_tomasys::NS]
+        [ontology::vocab::tomasys::NS, ontology::vocab::pddl_tomasys::NS, ontology::vocab::suave::NS]
             .map(|space| format!("{space}{name}"))
     });
     let predicates = names.iter().flatten().filter_map(|name| symbols.find_name(name));

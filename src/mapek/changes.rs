@@ -26,7 +26,8 @@ pub(super) struct Changes {
     pub(super) interruptions: Vec<String>,
     /// Reasons to plan, as sentences, that apply even if the current plan is valid.
     pub(super) reasons: Vec<String>,
-    /// Answers about filtered reports, until the reaction returns them. A pending deliberation contains none of them.
+    /// Answers about filtered reports. The reaction takes them out before it stores these changes for the next
+    /// deliberation.
     #[serde(skip)]
     pub(super) filtered: Vec<Answer>,
 }

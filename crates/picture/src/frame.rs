@@ -21,7 +21,7 @@ pub(crate) struct Canvas {
     /// Left edge of the drawing area; the tick labels of vertical axes are to the left of it.
     pub(crate) left: f64,
     pub(crate) has_names_above: bool,
-    /// Minimum average width of the steps of a plan, up to [`WIDEST`] for the whole plan.
+    /// Minimum average width of a step. For plans with many steps, it widens the drawing area to at most [`WIDEST`].
     pub(crate) step: f64,
     /// Intended minimum distance of neighbouring places of a map.
     pub(crate) apart: f64,

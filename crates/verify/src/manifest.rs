@@ -81,8 +81,8 @@ pub enum Claim {
     },
     /// There is no plan.
     Unsolvable,
-    /// These are all points of the Pareto front. A certificate of a front claims it; the manifest of a single
-    /// certificate cannot.
+    /// These are all points of the Pareto front. The verification of a front's certificate reports this claim. A
+    /// [`Manifest`] with it is refused, because it belongs to a certificate of a single plan.
     Front(Front),
 }
 

@@ -61,8 +61,8 @@ pub fn parse_rules_as(
 }
 
 /// Parses several rule texts about one ontology; `texts` contains pairs of source name and text. A relation in a body
-/// that no rule of any text derives has to be a class or a property. An atom of such a relation that can be neither
-/// (because it has no or more than two arguments, or a literal as its first one) is an unknown built-in.
+/// that no rule of any text derives has to be a class (one argument) or a property (two arguments). If an atom has
+/// another number of arguments, or a literal as its first one, its relation is reported as an unknown built-in.
 ///
 /// # Errors
 /// Returns the errors of [`parse_rules_as`] for each text. Without errors, returns R104 for unknown

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ontology::tomasys::{Action, FunctionDesign, Individual, Measurement, View};
-use ontology::vocab::{local_name, pddl_tomasys, tomasys};
+use ontology::vocab::{local_name, pddl_tomasys, suave, tomasys};
 use rules::{Delta, Engine, Fact, Literal, Symbol};
 
 /// Cached designs, actions and measured values, and the members of already queried classes.
@@ -22,14 +22,20 @@ pub struct Catalogue {
     classes: Arc<Mutex<BTreeMap<String, Arc<[Individual]>>>>,
 }
 
-const AVAILABILITY: [&str; 3] =
-    [tomasys::FD_REALISABILITY, pddl_tomasys::FD_REALISABILITY, tomasys::FD_AVAILABLE];
-const VALUES: [&str; 2] = [tomasys::HAS_VALUE, pddl_tomasys::QA_HAS_VALUE];
-const ESTIMATIONS: [&str; 2] = [tomasys::HAS_QA_ESTIMATION, pddl_tomasys::HAS_QA_ESTIMATION];
+const AVAILABILITY: [&str; 4] = [
+    tomasys::FD_REALISABILITY,
+    pddl_tomasys::FD_REALISABILITY,
+    suave::FD_REALISABILITY,
+    tomasys::FD_AVAILABLE,
+];
+const VALUES: [&str; 3] = [tomasys::HAS_VALUE, pddl_tomasys::QA_HAS_VALUE, suave::HAS_VALUE];
+const ESTIMATIONS: [&str; 3] =
+    [tomasys::HAS_QA_ESTIMATION, pddl_tomasys::HAS_QA_ESTIMATION, suave::HAS_QA_ESTIMATION];
 /// Properties whose facts do not affect the cache.
-const OTHERS: [&str; 12] = [
+const OTHERS: [&str; 13] = [
     tomasys::C_STATUS,
     pddl_tomasys::C_STATUS,
+    suave::C_STATUS,
     tomasys::O_STATUS,
     tomasys::O_UPDATABLE,
     tomasys::O_ALWAYS_IMPROVE,

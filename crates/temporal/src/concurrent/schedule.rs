@@ -86,8 +86,9 @@ fn bounds<T: TimeNumber>(
     let mut latest: FxHashMap<Key, usize> = FxHashMap::default();
     // Runs of an instance end in the order of their starts.
     let mut open_starts: FxHashMap<u32, VecDeque<usize>> = FxHashMap::default();
-    // Running actions with a joint over-all condition, each with the last happening that wrote an
-    // atom or number in this condition.
+    // Running actions whose over-all condition several simultaneous happenings can maintain
+    // together (`Instance::joint`), each with the last happening that wrote an atom or number of
+    // this condition (at first, the start of the action).
     let mut joint: Vec<(u32, usize)> = Vec::new();
     let mut floor = T::ZERO;
     for (index, id) in sequence.iter().enumerate() {

@@ -169,7 +169,8 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
     }
 
     /// Earliest possible time of the latest change of a variable. Returns `None` if the variable
-    /// never changed, or is neither a goal variable nor a guard.
+    /// never changed, or if its changes are not recorded: it is neither in the goal nor in
+    /// `TemporalTask::guards`.
     pub(super) fn changed(&self, variable: u32) -> Option<T> {
         self.change(variable).map(|time| time.base)
     }

@@ -63,8 +63,8 @@ enum Undo {
 }
 
 impl Procedures {
-    /// Creates the procedures. `functions` has one for each mode of each function. `report` receives the events
-    /// about their steps.
+    /// Creates the procedures. `functions` contains, for each function with procedures, the procedure of each of its
+    /// modes. `report` receives the events about their steps.
     pub(crate) fn new(
         node: &Arc<Node>,
         functions: BTreeMap<String, BTreeMap<String, Procedure>>,

@@ -40,8 +40,8 @@ use search::{Outcome, Search};
 /// Checks that the chosen durations of a task are supported.
 ///
 /// # Errors
-/// Fails if a derived predicate compares numbers, because its truth would depend on durations. Conditional
-/// effects and constraints that compare numbers are compiled to such predicates.
+/// Fails if a derived predicate compares numbers, because its truth would depend on durations. Grounding also
+/// introduces such predicates, for example for disjunctions that compare numbers.
 pub(super) fn check(concurrent: &TemporalTask) -> Result<(), Errors> {
     let mut rules = concurrent.task.axioms.iter().flat_map(|layer| &layer.rules);
     if rules.all(|rule| rule.body.linears().next().is_none()) {
