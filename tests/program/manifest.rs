@@ -86,10 +86,11 @@ fn invalid_sections_are_refused_by_all_commands() {
 
 #[test]
 fn all_errors_of_a_manifest_are_reported() {
-    // A required field that is present but invalid is not reported as missing.
+    // A required field that is present but invalid is not reported as missing. A character of several bytes does not shift the
+    // positions of later errors.
     check(
-        "[probabilistic]\nbattery_unit = \"x\"\n[scenaros.s]\nfail = [\"c_kinect\"]\n[adaptation]\nsetle = 1\nsettle = \"x\"\nmin = 2",
-        "10:16: error[M104]: invalid type: string \"x\", expected u32\n\
+        "[probabilistic]\nbattery_unit = \"größe\"\n[scenaros.s]\nfail = [\"c_kinect\"]\n[adaptation]\nsetle = 1\nsettle = \"x\"\nmin = 2",
+        "10:16: error[M104]: invalid type: string \"größe\", expected u32\n\
          m.toml:11:2: error[M104]: unknown field `scenaros`, expected one of `name`, `description`, `knowledge`, `planning`, \
          `bindings`, `adaptation`, `probabilistic`, `report`, `scenarios`; did you mean `scenarios`?\n\
          m.toml:14:1: error[M104]: unknown field `setle`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
