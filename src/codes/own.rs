@@ -227,7 +227,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M152",
         "A run of a study cannot be performed.",
-        "The program that writes its files fails or does not exist.",
+        "The program that writes its files does not exist or cannot be started.",
         "Run the program manually with the arguments in the message.",
     ],
     [
