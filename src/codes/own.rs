@@ -71,7 +71,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M120",
         "There is no certificate.",
-        "The answer is not proved, certificates do not cover a part of the task, or the ground task could not be compared with the files.",
+        "The answer is not proved, certificates do not cover a part of the task, a limit was reached, or the ground task could not be compared with the files.",
         "The message gives the reason. The plan itself is shown.",
     ],
     [
