@@ -9,7 +9,7 @@ use planner::Limits;
 use serde_json::Value;
 
 use super::results::Line;
-use super::study::{Planned, Study};
+use super::study::{Planned, Study, shown};
 use crate::message::Message;
 
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
@@ -84,7 +84,6 @@ pub fn perform(
 }
 
 fn command_line(program: &Path, words: &[String]) -> String {
-    let words: Vec<&str> = words.iter().map(String::as_str).collect();
     format!("{} {}", program.display(), words.join(" ")).trim_end().to_owned()
 }
 
@@ -100,8 +99,11 @@ fn error_texts(answer: &Value) -> Option<String> {
     answer["format"].as_str().filter(|format| format.starts_with("metaplan-error/"))?;
     let messages = answer["messages"].as_array().into_iter().flatten();
     let text = |message: &Value| {
-        let part = |name: &str| message[name].as_str().unwrap_or_default().to_owned();
-        format!("{}[{}]: {}", part("severity"), part("code"), part("message"))
+        let part = |name: &str| message[name].as_str().unwrap_or_default();
+        let place = ["file", "line", "column"].iter().map(|name| &message[*name]);
+        let place: String = place.filter(|part| !part.is_null()).map(|part| shown(part) + ":").collect();
+        let text = format!("{}[{}]: {}", part("severity"), part("code"), part("message"));
+        if place.is_empty() { text } else { format!("{place} {text}") }
     };
     Some(messages.map(text).collect::<Vec<_>>().join("\n"))
 }

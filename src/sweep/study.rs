@@ -413,7 +413,8 @@ fn filled(word: &str, vary: &Map<String, Value>, directory: &Path) -> String {
     text
 }
 
-fn shown(value: &Value) -> String {
+/// Formats a value as in a command: texts without quotes.
+pub(super) fn shown(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 

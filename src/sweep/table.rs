@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Map, Value};
 
 use super::results::{Line, essence};
+use super::study::shown;
 use crate::simulate::Sample;
 
 /// Column of the exit statuses, of which no mean is computed. Many answers have a field `status`.
@@ -81,7 +82,7 @@ impl Table {
                 for (key, value) in &line.vary {
                     let Some(cell) = cells.remove(key) else { continue };
                     let namesake = format!("{ANSWER}{key}");
-                    if text(&cell) != text(&joined(value.clone())) {
+                    if shown(&cell) != shown(&joined(value.clone())) {
                         namesakes.insert(namesake.clone());
                     }
                     cells.insert(namesake, cell);
@@ -116,7 +117,7 @@ impl Table {
         // Writing into memory does not fail.
         let _ = writer.write_record(header);
         for row in &self.rows {
-            let cells = row.cells.iter().map(|cell| cell.as_ref().map(text).unwrap_or_default());
+            let cells = row.cells.iter().map(|cell| cell.as_ref().map(shown).unwrap_or_default());
             let _ = writer.write_record(std::iter::once(row.run.to_string()).chain(cells));
         }
         String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
@@ -161,10 +162,6 @@ impl Table {
     }
 }
 
-fn text(value: &Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
-}
-
 fn figure(value: &Value) -> Option<f64> {
     value.as_bool().map(|truth| f64::from(u8::from(truth))).or_else(|| value.as_f64())
 }
@@ -172,7 +169,7 @@ fn figure(value: &Value) -> Option<f64> {
 fn joined(value: Value) -> Value {
     match value {
         Value::Array(values) => {
-            let words: Vec<String> = values.iter().map(text).collect();
+            let words: Vec<String> = values.iter().map(shown).collect();
             Value::String(words.join(" "))
         }
         other => other,
