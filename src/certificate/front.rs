@@ -27,7 +27,7 @@ fn wrong(reason: &str) -> Message {
 ///
 /// # Errors
 /// Both objectives depend on the total time; the front has no points or too many; one of the certificates that the
-/// front needs cannot be written, or would be rejected (M120); the knowledge base cannot be read again; or the
+/// front needs cannot be written within the limits, or would be rejected (M120); the knowledge base cannot be read again; or the
 /// directory cannot be written (M109).
 pub fn write_front(
     directory: &Path,
@@ -99,6 +99,10 @@ fn write_member(
     limits: &Limits,
 ) -> Result<(), Message> {
     let first = |errors: Errors| {
+        // The front was grounded before, so the limit is not a fault of its task.
+        if errors.iter().any(|error| error.code == "E306") {
+            return wrong("a limit was reached before the certificates of all points were written");
+        }
         let unknown = || wrong("the problem of a point cannot be ground");
         errors.into_vec().into_iter().next().unwrap_or_else(unknown)
     };

@@ -240,7 +240,8 @@ fn is_proved(arguments: &Arguments, report: &Report) -> bool {
 fn single(arguments: &Arguments, common: &Common, property: &str, report: &Report) -> Result<Exit, Failure> {
     if let Some(path) = &arguments.policy {
         let Some(policy) = &report.policy else {
-            let text = "this property has no policy to write; ask for one value with `F`, `G` or `U`";
+            let text = "this property has no policy to write; ask for one value with `F`, `G` or `U` without a bound \
+                        such as `<=6`";
             return Err(Failure::usage(Message::error("M107", text)));
         };
         output::write_file(path, &output::pretty(&policy.to_json()))?;

@@ -2,7 +2,7 @@
 
 use crate::message::Message;
 use num_bigint::BigInt;
-use num_traits::Signed;
+use num_traits::{Signed, Zero as _};
 use probabilistic::Error;
 use probabilistic::check::{Answer, Outcome, Report};
 use probabilistic::number::parse_decimal;
@@ -78,8 +78,15 @@ fn values(name: &str, text: &str) -> Result<Vec<String>, String> {
     };
     let read = |part: &str| {
         let (negative, digits) = part.strip_prefix('-').map_or((false, part), |digits| (true, digits));
-        let value = parse_decimal(digits)
-            .ok_or_else(|| format!("`{part}` of the series `{name}={text}` is not a number"))?;
+        let value = match digits.split_once('/') {
+            Some((numerator, denominator)) => parse_decimal(denominator)
+                .filter(|denominator| !denominator.is_zero())
+                .and_then(|denominator| Some(parse_decimal(numerator)? / denominator)),
+            None => parse_decimal(digits),
+        };
+        let value = value.ok_or_else(|| {
+            format!("`{part}` of the series `{name}={text}` is not a number; write it like `0.25` or `1/4`")
+        })?;
         Ok::<_, String>(if negative { -value } else { value })
     };
     let (first, step, last) = (read(first)?, read(step)?, read(last)?);
@@ -98,8 +105,7 @@ fn values(name: &str, text: &str) -> Result<Vec<String>, String> {
     let mut values = Vec::new();
     let mut value = first;
     while value <= last {
-        // All values of a series have finite decimal expansions.
-        values.extend(pddl::to_decimal(&value));
+        values.push(pddl::to_decimal(&value).unwrap_or_else(|| value.to_string()));
         value += &step;
     }
     Ok(values)

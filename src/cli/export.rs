@@ -7,6 +7,7 @@ use crate::comparison::{Coadaptation, Risk, Roles, Tasked, program, published_pr
 use crate::message::Message;
 use crate::mission::Mission;
 use crate::setup::Setup;
+use crate::visible::visible_json;
 use clap::{Args, ValueEnum};
 use pddl::ast::Problem;
 use pddl::{portable, print_domain, print_problem};
@@ -34,7 +35,7 @@ pub struct Arguments {
     #[command(flatten)]
     time: TimeLimit,
     /// Directory for `domain.pddl` and `problem.pddl`, created if it does not exist, or output file for
-    /// a model. Default: standard output.
+    /// a model; with `--format json`, the file contains the JSON answer. Default: standard output.
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
 }
@@ -119,11 +120,12 @@ fn process(
         },
         _ => probabilistic::prism::write(&model),
     };
+    let text = match common.format {
+        Format::Json => visible_json(&output::pretty(&ModelExport::new(text))).into_owned(),
+        _ => text,
+    };
     match output::file_named(arguments.output.as_ref()) {
         Some(file) => output::write_file(file, &text)?,
-        None if common.format == Format::Json => {
-            output::json_answer(&ModelExport::new(text));
-        }
         None => output::document(&text),
     }
     Ok(Exit::Done)

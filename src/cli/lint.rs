@@ -40,6 +40,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let texts: String = messages.iter().map(|message| output::shown(message, colors)).collect();
         output::document(&(texts + &summary(errors, warnings)));
     }
+    if messages.iter().any(|message| message.code == "M110") {
+        return Ok(Exit::Inconsistent);
+    }
     Ok(match (errors, warnings) {
         (0, 0) => Exit::Done,
         (0, _) => Exit::NotProved,

@@ -91,11 +91,17 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         .map(|directory| Verifier::new(directory).mission(&setup.mission).stop(|| limits.reached()))
         .map(|verifier| checked(&during("verifying", common, || verifier.verify())));
     let (status, said) = (answer.solution.status, answer.solution.verdict());
+    let rejected =
+        checked.as_ref().filter(|checked| !checked.verified).map(|checked| checked.verdict.clone());
     let report = page(arguments, &setup, before, answer, checked);
     if let Some(directory) = &arguments.svg {
         write_pictures(directory, &report.pictures())?;
     }
     write(arguments, &report.html(), &format!("{said}\n"))?;
+    if let (Some(verdict), Some(directory)) = (rejected, &arguments.certificate) {
+        output::note(&format!("{}: {verdict}\n", directory.display()));
+        return Ok(Exit::Invalid);
+    }
     Ok(exit(status))
 }
 

@@ -71,7 +71,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M120",
         "There is no certificate.",
-        "The answer is not proved, certificates do not cover a part of the task, or the ground task could not be compared with the files.",
+        "The answer is not proved, certificates do not cover a part of the task, a limit was reached, or the ground task could not be compared with the files.",
         "The message gives the reason. The plan itself is shown.",
     ],
     [
@@ -227,7 +227,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M152",
         "A run of a study cannot be performed.",
-        "The program that writes its files fails or does not exist.",
+        "The program that writes its files does not exist or cannot be started.",
         "Run the program manually with the arguments in the message.",
     ],
     [

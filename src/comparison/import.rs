@@ -161,6 +161,8 @@ impl LegalConfiguration {
 /// Full speed in metres per second. The energy of a move is computed from it, and the time if the map has no
 /// measurements.
 const SPEED: f64 = 0.68;
+/// Lower limit on the mean speed that is computed from measurements, in metres per second.
+const MIN_SPEED: f64 = 0.001;
 /// Factor in the energy of a move at full speed, in the map's unit: length in metres × [`SPEED`] × power in
 /// milliwatts × this factor.
 const ENERGY: f64 = 0.01;
@@ -361,7 +363,8 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
             .filter_map(|(arc, by)| Some((rounded(length(arc), 6), *by.get(source)?)))
             .filter(|(_, seconds)| *seconds > 0.0)
             .fold((0.0, 0.0), |(m, s), (metres, seconds)| (m + metres, s + seconds));
-        rounded(if seconds > 0.0 { metres / seconds } else { SPEED }, 3)
+        // The time of a move with the speed 0 would be infinite.
+        rounded(if seconds > 0.0 { metres / seconds } else { SPEED }, 3).max(MIN_SPEED)
     };
     let mut init = String::new();
     for arc in &arcs {

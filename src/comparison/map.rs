@@ -12,6 +12,10 @@ use serde_json::value::RawValue;
 
 use crate::message::{Errors, Message, did_you_mean};
 
+/// Upper limit on the magnitudes of coordinates and measured times. With it, all computed times and
+/// energies are finite.
+const MAX_NUMBER: f64 = 1e12;
+
 #[derive(Deserialize)]
 pub(super) struct Map<'t> {
     #[serde(rename = "map", borrow)]
@@ -127,8 +131,9 @@ impl<'t> Map<'t> {
                 }
                 None => {}
             }
-            if !(node.coords.x.is_finite() && node.coords.y.is_finite()) {
-                wrong(node.id.raw, format!("the coordinates of `{id}` are not finite"));
+            if [node.coords.x, node.coords.y].iter().any(|metres| metres.abs() > MAX_NUMBER) {
+                let text = format!("a coordinate of `{id}` is beyond {MAX_NUMBER:e} metres; correct it");
+                wrong(node.id.raw, text);
             }
             for next in &node.neighbours {
                 if !places.contains(next.text.as_str()) {
@@ -145,6 +150,13 @@ impl<'t> Map<'t> {
         let measured = self.time.iter().chain(&self.hitrate).chain(&self.successrate);
         for entry in measured.filter(|entry| entry.from == entry.to) {
             wrong(entry.raw, format!("this measures the way from `{}` to itself", entry.from));
+        }
+        for entry in &self.time {
+            let measurements = entry.entry.as_object().into_iter().flatten();
+            let means = measurements.filter_map(|(name, value)| Some((name, value["mean"].as_f64()?)));
+            for (name, _) in means.filter(|(_, mean)| *mean > MAX_NUMBER) {
+                wrong(entry.raw, format!("the mean of `{name}` is above {MAX_NUMBER:e} seconds; correct it"));
+            }
         }
         problems
     }

@@ -2,28 +2,28 @@
 
 use std::io::Read;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use planner::Limits;
 use serde_json::Value;
 
 use super::results::Line;
-use super::study::{Planned, Study};
+use super::study::{Planned, Study, shown};
 use crate::message::Message;
 
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 const MAX_MESSAGE_CHARACTERS: usize = 2000;
 
-/// Executes a run of a study with `program`, and waits for its end. At the study's time limit, the
-/// run is killed and a result is returned. If a limit in `limits` is reached first, the run is killed
-/// and `None` is returned. The generator of the run's files is not subject to the limits, but its
-/// duration counts towards the time limit of the run.
+/// Executes a run of a study with `program`, and waits for its end. At the study's time limit, which
+/// includes the generator of the run's files, the running process is killed and a result is
+/// returned. If a limit in `limits` is reached first, the process is killed and `None` is returned.
+/// If the generator fails, the result has no answer.
 ///
 /// # Errors
-/// The program cannot be executed, the generator of its files cannot be executed or fails, or the
-/// system provides no temporary directory or no exit status.
+/// The program or the generator cannot be started, or the system provides no temporary directory or no
+/// exit status.
 pub fn perform(
     program: &Path,
     study: &Study,
@@ -35,47 +35,121 @@ pub fn perform(
     };
     let folder = tempfile::tempdir().map_err(|error| failed("a directory of its own", &error))?;
     let begun = Instant::now();
+    let time_limit = study.time_limit().map(Duration::from_secs_f64);
+    let execute = |program: &Path, words: &[String]| {
+        execute(program, words, &study.directory, &|| {
+            if time_limit.is_some_and(|limit| begun.elapsed() >= limit) {
+                Some(Reached::TimeLimit)
+            } else {
+                limits.reached().then_some(Reached::Study)
+            }
+        })
+        .map_err(|error| failed(&command_line(program, words), &error))
+    };
+    let line = |status: Option<i32>, timed_out: bool, answer: Value, message: String| {
+        let seconds = (begun.elapsed().as_secs_f64() * 1000.0).round() / 1000.0;
+        Line { run: run.number, vary: run.vary.clone(), status, timed_out, seconds, answer, message }
+    };
     if let Some(words) = study.generator(run, folder.path())
         && let Some((generator, arguments)) = words.split_first()
     {
-        let output = Command::new(generator)
-            .args(arguments)
-            .current_dir(&study.directory)
-            .stdin(Stdio::null())
-            .output()
-            .map_err(|error| failed(generator, &error))?;
-        if !output.status.success() {
-            let text = String::from_utf8_lossy(&output.stderr);
-            return Err(failed(generator, &format!("{}\n{}", output.status, text.trim_end())));
+        let generator = Path::new(generator);
+        let ended = execute(generator, arguments)?;
+        let reason = match ended.status {
+            Ok(status) if status.success() => None,
+            Ok(status) => Some(status.to_string()),
+            Err(Reached::TimeLimit) => Some("reached the time limit of the run".to_owned()),
+            Err(Reached::Study) => return Ok(None),
+        };
+        if let Some(reason) = reason {
+            let message =
+                format!("{}: {reason}\n{}", command_line(generator, arguments), end_of(&ended.errors));
+            let message = message.trim_end().to_owned();
+            return Ok(Some(line(None, ended.status.is_err(), Value::Null, message)));
         }
     }
+    let ended = execute(program, &study.words(run, folder.path()))?;
+    let (status, timed_out) = match ended.status {
+        Ok(status) => (status.code(), false),
+        Err(Reached::TimeLimit) => (None, true),
+        Err(Reached::Study) => return Ok(None),
+    };
+    let answer: Value = serde_json::from_str(&ended.output).unwrap_or_default();
+    let (answer, message) = match error_texts(&answer) {
+        Some(texts) => (Value::Null, texts),
+        None if answer.is_null() => (Value::Null, end_of(&ended.errors).to_owned()),
+        None => (answer, String::new()),
+    };
+    Ok(Some(line(status, timed_out, answer, message)))
+}
+
+fn command_line(program: &Path, words: &[String]) -> String {
+    format!("{} {}", program.display(), words.join(" ")).trim_end().to_owned()
+}
+
+/// Returns the last characters of a text, at most [`MAX_MESSAGE_CHARACTERS`].
+fn end_of(text: &str) -> &str {
+    let from = text.char_indices().rev().nth(MAX_MESSAGE_CHARACTERS - 1).map_or(0, |(at, _)| at);
+    text[from..].trim_end()
+}
+
+/// Returns the messages of the answer of a failed command, one per line. Returns `None` if the
+/// command has not failed.
+fn error_texts(answer: &Value) -> Option<String> {
+    answer["format"].as_str().filter(|format| format.starts_with("metaplan-error/"))?;
+    let messages = answer["messages"].as_array().into_iter().flatten();
+    let text = |message: &Value| {
+        let part = |name: &str| message[name].as_str().unwrap_or_default();
+        let place = ["file", "line", "column"].iter().map(|name| &message[*name]);
+        let place: String = place.filter(|part| !part.is_null()).map(|part| shown(part) + ":").collect();
+        let text = format!("{}[{}]: {}", part("severity"), part("code"), part("message"));
+        if place.is_empty() { text } else { format!("{place} {text}") }
+    };
+    Some(messages.map(text).collect::<Vec<_>>().join("\n"))
+}
+
+/// Limit that ended a process.
+#[derive(Debug, Clone, Copy)]
+enum Reached {
+    /// The time limit of the run.
+    TimeLimit,
+    /// A limit of the whole study, or an interruption.
+    Study,
+}
+
+/// A process that has ended or was killed.
+#[derive(Debug)]
+struct Ended {
+    /// Exit status, or the limit at which the process was killed.
+    status: Result<ExitStatus, Reached>,
+    /// Text on standard output.
+    output: String,
+    /// Text on standard error.
+    errors: String,
+}
+
+/// Executes a program in a directory, and kills it once `reached` returns a limit.
+fn execute(
+    program: &Path,
+    words: &[String],
+    directory: &Path,
+    reached: &dyn Fn() -> Option<Reached>,
+) -> std::io::Result<Ended> {
     let mut command = Command::new(program);
     // Ctrl-C must reach only this program, which then kills the run. A run that is interrupted itself would
     // give a partial answer, which would falsify the study.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let mut child = command
-        .args(study.words(run, folder.path()))
-        .current_dir(&study.directory)
+        .args(words)
+        .current_dir(directory)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
-        .spawn()
-        .map_err(|error| failed(&program.display().to_string(), &error))?;
-    let (out, errors) = (reader(child.stdout.take()), reader(child.stderr.take()));
-    let ended = wait(&mut child, study.time_limit().map(Duration::from_secs_f64), begun, limits)
-        .map_err(|error| failed("its end", &error))?;
-    let (out, errors) = (out.join().unwrap_or_default(), errors.join().unwrap_or_default());
-    let Some((status, timed_out)) = ended else { return Ok(None) };
-    let answer: Value = serde_json::from_str(&out).unwrap_or_default();
-    let message = if answer.is_null() {
-        let from = errors.char_indices().rev().nth(MAX_MESSAGE_CHARACTERS - 1).map_or(0, |(at, _)| at);
-        errors[from..].trim_end().to_owned()
-    } else {
-        String::new()
-    };
-    let seconds = (begun.elapsed().as_secs_f64() * 1000.0).round() / 1000.0;
-    Ok(Some(Line { run: run.number, vary: run.vary.clone(), status, timed_out, seconds, answer, message }))
+        .spawn()?;
+    let (output, errors) = (reader(child.stdout.take()), reader(child.stderr.take()));
+    let status = wait(&mut child, reached)?;
+    Ok(Ended { status, output: output.join().unwrap_or_default(), errors: errors.join().unwrap_or_default() })
 }
 
 /// Reads a pipe to its end on a separate thread, because reading two pipes in turn may deadlock.
@@ -101,23 +175,20 @@ fn kill(child: &mut Child) -> std::io::Result<()> {
     child.kill()
 }
 
-/// Waits for the end of a process. Returns its exit status, and `true` if `limit`, the time limit
-/// of a run, ended it. If a limit of `limits` is reached, kills the process and returns `None`.
+/// Waits for the end of a process. Returns its exit status. Once `reached` returns a limit, kills the
+/// process and returns the limit.
 fn wait(
     child: &mut Child,
-    limit: Option<Duration>,
-    begun: Instant,
-    limits: &Limits,
-) -> std::io::Result<Option<(Option<i32>, bool)>> {
+    reached: &dyn Fn() -> Option<Reached>,
+) -> std::io::Result<Result<ExitStatus, Reached>> {
     loop {
         if let Some(status) = child.try_wait()? {
-            return Ok(Some((status.code(), false)));
+            return Ok(Ok(status));
         }
-        let is_late = limit.is_some_and(|limit| begun.elapsed() >= limit);
-        if is_late || limits.reached() {
+        if let Some(limit) = reached() {
             kill(child)?;
             child.wait()?;
-            return Ok(is_late.then_some((None, true)));
+            return Ok(Err(limit));
         }
         std::thread::sleep(POLL_INTERVAL);
     }

@@ -32,15 +32,16 @@ pub struct Line {
     pub run: usize,
     /// Varied keys with their values.
     pub vary: Map<String, Value>,
-    /// Exit status. `None` if the time limit or a signal ended the run.
+    /// Exit status of the command. `None` if the time limit or a signal ended it, or if the generator of its
+    /// files failed.
     pub status: Option<i32>,
     /// `true` if the time limit ended the run.
     pub timed_out: bool,
     /// Duration of the run and of the generator of its files, in seconds.
     pub seconds: f64,
-    /// JSON answer of the run; null if the output is not JSON.
+    /// JSON answer of the run; null if the output is not JSON, or is the message of an error.
     pub answer: Value,
-    /// End of the standard error output, if there is no answer.
+    /// If there is no answer: the messages of the error, or the end of the standard error output.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub message: String,
 }

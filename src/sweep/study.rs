@@ -28,7 +28,7 @@ struct Sections {
     /// Command of `metaplan` with the arguments that are common to all runs. `{KEY}` is replaced by a
     /// varied value, `{dir}` by a separate directory for each run.
     command: Vec<String>,
-    /// Time limit of a run in seconds.
+    /// Time limit of a run in seconds, including the program that writes its files.
     #[serde(default)]
     time_limit: Option<f64>,
     /// JSON pointer to the rows of the table in an answer: to an object or to a list of objects.
@@ -413,7 +413,8 @@ fn filled(word: &str, vary: &Map<String, Value>, directory: &Path) -> String {
     text
 }
 
-fn shown(value: &Value) -> String {
+/// Formats a value as in a command: texts without quotes.
+pub(super) fn shown(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 

@@ -5,10 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Map, Value};
 
 use super::results::{Line, essence};
+use super::study::shown;
 use crate::simulate::Sample;
 
 /// Column of the exit statuses, of which no mean is computed. Many answers have a field `status`.
 const STATUS: &str = "exit_status";
+
+/// Prefix of the columns of an answer's fields that have the name of a varied key.
+const ANSWER: &str = "answer.";
 
 /// Value in a cell. `None` if the row has no value for the column.
 pub type Cell = Option<Value>;
@@ -52,10 +56,13 @@ pub struct Group {
 impl Table {
     /// Builds the table. `rows` is the JSON pointer to an object, or a list of objects, in each answer; each
     /// object becomes a row. A run whose answer has nothing there gives one row without fields of an answer;
-    /// an empty list gives no row.
+    /// an empty list gives no row. A field of the answers that has the name of a varied key is in the column
+    /// `answer.KEY`, but is omitted if it has the value of the key in all rows.
     /// With `measured`, includes the fields that depend on the machine, such as times.
     pub fn new(lines: &[Line], rows: &str, measured: bool) -> Self {
         let mut rows_of_lines: Vec<(&Line, Map<String, Value>)> = Vec::new();
+        // Fields with the name of a varied key that are not just a copy of its value.
+        let mut namesakes: BTreeSet<String> = BTreeSet::new();
         for line in lines {
             let answer = if measured { line.answer.clone() } else { essence(&line.answer) };
             let mut fields = Map::new();
@@ -72,6 +79,14 @@ impl Table {
             for part in parts {
                 let mut cells = fields.clone();
                 flatten("", &part, &mut cells);
+                for (key, value) in &line.vary {
+                    let Some(cell) = cells.remove(key) else { continue };
+                    let namesake = format!("{ANSWER}{key}");
+                    if shown(&cell) != shown(&joined(value.clone())) {
+                        namesakes.insert(namesake.clone());
+                    }
+                    cells.insert(namesake, cell);
+                }
                 rows_of_lines.push((line, cells));
             }
         }
@@ -80,7 +95,10 @@ impl Table {
         let columns: BTreeSet<String> = rows_of_lines
             .iter()
             .flat_map(|(_, cells)| cells.keys().cloned())
-            .filter(|column| !keys.contains(column))
+            .filter(|column| {
+                let key = column.strip_prefix(ANSWER);
+                key.is_none_or(|key| !keys.contains(key)) || namesakes.contains(column)
+            })
             .collect();
         let rows = rows_of_lines.into_iter().map(|(line, cells)| {
             let keys = keys.iter().map(|key| line.vary.get(key).cloned().map(joined));
@@ -95,12 +113,11 @@ impl Table {
     /// Formats the table as CSV: one line per row, with all columns; missing values are empty.
     pub fn to_csv(&self) -> String {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
         let header = std::iter::once("run".to_owned()).chain(self.columns.iter().cloned());
         // Writing into memory does not fail.
         let _ = writer.write_record(header);
         for row in &self.rows {
-            let cells = row.cells.iter().map(|cell| cell.as_ref().map(text).unwrap_or_default());
+            let cells = row.cells.iter().map(|cell| cell.as_ref().map(shown).unwrap_or_default());
             let _ = writer.write_record(std::iter::once(row.run.to_string()).chain(cells));
         }
         String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
@@ -152,10 +169,7 @@ fn figure(value: &Value) -> Option<f64> {
 fn joined(value: Value) -> Value {
     match value {
         Value::Array(values) => {
-            let words: Vec<String> = values
-                .iter()
-                .map(|value| value.as_str().map_or_else(|| value.to_string(), str::to_owned))
-                .collect();
+            let words: Vec<String> = values.iter().map(shown).collect();
             Value::String(words.join(" "))
         }
         other => other,
@@ -206,13 +220,18 @@ mod tests {
         assert_eq!((costs.count, costs.mean), (2, 3.0));
         // Quantile of Student's distribution for one degree of freedom, times the deviation over
         // the square root of two.
-        assert!((costs.half_width - 12.706).abs() < 1e-9);
+        assert!((costs.half_width - 12.706_205).abs() < 1e-9);
         assert!(Table::new(&lines, "", true).columns.contains(&"seconds".to_owned()));
         // The status of an answer is a text that separates groups.
         let answers = ["optimal", "feasible"].map(|status| line(0, 1, "a", json!({"status": status})));
         let table = Table::new(&answers, "", false);
         assert_eq!(table.columns, ["fail", "seed", "exit_status", "status", "timed_out"]);
         assert_eq!(table.groups(&["seed".to_owned()]).len(), 2);
+        // A field with the name of a varied key has a column of its own, unless it repeats the key.
+        let answers = [1, 5].map(|seed| line(0, 1, "a", json!({"seed": seed, "fail": "a"})));
+        let table = Table::new(&answers, "", false);
+        assert_eq!(table.columns, ["fail", "seed", "answer.seed", "exit_status", "timed_out"]);
+        assert_eq!(table.rows[1].cells[1..3], [Some(json!(1)), Some(json!(5))]);
         let parts = Table::new(&[line(0, 1, "a", json!({"l": [{"v": 1}, {"v": 2}]}))], "/l", false);
         assert_eq!(parts.rows.len(), 2);
     }

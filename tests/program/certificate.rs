@@ -1,7 +1,10 @@
 //! Tests of `metaplan plan --certificate` and `metaplan verify`.
 
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
+use metaplan::planner::{Limits, Planner};
+use metaplan::setup::Setup;
 use serde_json::{Value, json};
 
 use crate::common::{Outcome, headlines, metaplan, metaplan_in, root, verify_in};
@@ -124,6 +127,22 @@ fn fronts_have_certificates() {
     assert_eq!(planned.status, 10, "{planned:#?}");
     let outcome = verify(&certificate);
     assert!(outcome.stdout.contains("\nverified: there is no plan"), "{outcome:#?}");
+}
+
+/// A limit during the certificate of a point is not reported as a fault of the task (E306).
+#[test]
+fn fronts_without_time_for_their_certificates_have_none() {
+    let setup = Setup::read(&root().join("missions/ugv.toml")).expect("a mission");
+    let limits = Limits::none();
+    let planner = Planner::new(&setup.mission).expect("it can be planned").limits(limits.clone());
+    let front = planner.pareto(["battery_used", "total-time"]).expect("a front");
+    limits.interrupt().store(true, Ordering::Relaxed);
+    let directory = tempfile::tempdir().expect("a directory");
+    let target = directory.path().join("front");
+    let message = front.certify(&target).expect_err("a limit is reached");
+    assert_eq!(message.code, "M120", "{message}");
+    assert!(message.message.contains("a limit was reached"), "{message}");
+    assert!(!target.exists());
 }
 
 #[test]

@@ -65,6 +65,39 @@ fn constants_are_given_once() {
 }
 
 #[test]
+fn series_can_have_fractions() {
+    let model =
+        MODEL.replace("mdp\n", "mdp\nconst double p;\n").replace("PROBABILITIES", "p:(s'=1) + 1-p:(s'=2)");
+    let check = |series: &str| {
+        metaplan_in(
+            &root(),
+            &["check", "-", "Pmax=? [ F s=1 ]", "--const", series, "--format", "json"],
+            &model,
+        )
+    };
+    let outcome = check("p=1/3:1/3:1");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let answer = outcome.json();
+    let answers = answer["answers"].as_array().expect("answers");
+    let values: Vec<&str> =
+        answers.iter().map(|answer| answer["constants"]["p"].as_str().expect("a value")).collect();
+    assert_eq!(values, ["1/3", "2/3", "1"], "{answer:#}");
+    let refused = check("p=0:1/0:1");
+    assert!(refused.status == 2 && refused.stdout.contains("`1/0` of the series"), "{refused:#?}");
+}
+
+#[test]
+fn properties_without_a_policy_are_refused() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("policy.json");
+    let arguments = ["check", "-", "Pmax=? [ F<=6 s=1 ]", "--policy", file.to_str().expect("UTF-8")];
+    let outcome = metaplan_in(&root(), &arguments, &MODEL.replace("PROBABILITIES", "(s'=1)"));
+    assert_eq!(outcome.status, 2, "{outcome:#?}");
+    assert!(outcome.stderr.contains("without a bound"), "{outcome:#?}");
+    assert!(!file.exists());
+}
+
+#[test]
 fn an_error_in_a_series_names_the_values_of_its_constants() {
     let arguments = ["check", "-", "Pmax=? [ F s=1 ]", "--const", "n=1:3", "--const", "m=7"];
     let model =

@@ -87,6 +87,18 @@ fn exported_files_are_normalised() {
 }
 
 #[test]
+fn files_of_models_have_the_requested_format() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = directory.path().join("model.json").display().to_string();
+    let arguments = ["export", "missions/camara_like.toml", "--to", "prism", "--format", "json"];
+    let printed = metaplan(&arguments);
+    assert_eq!(printed.json()["format"], "metaplan-export/1");
+    let written = metaplan(&[&arguments[..], &["-o", &file]].concat());
+    assert_eq!((written.status, written.stdout.as_str()), (0, ""), "{written:#?}");
+    assert_eq!(std::fs::read_to_string(&file).expect("a file"), printed.stdout);
+}
+
+#[test]
 fn unwritable_targets_are_reported() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let file = directory.path().join("file");

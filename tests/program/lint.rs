@@ -282,7 +282,7 @@ fn unsupported_features_are_reported_without_planning() {
 fn inconsistent_knowledge_is_an_error() {
     let outcome = check(
         &[("robot.ttl", ":c_lamp a t:Component .", ":c_lamp a t:Component , t:Function .")],
-        3,
+        20,
         &["M110", "inconsistent"],
     );
     assert!(outcome.stdout.ends_with("0 warnings\n"), "{}", outcome.stdout);

@@ -130,6 +130,21 @@ fn map_errors_have_a_position() {
     check("],\n", "],,\n", "8:3", "this is not a map");
     check("\n}\n", "\n", "12:1", "EOF");
     check("],\n", "],\n\"time\": [{\"from\": \"h1\"}],\n", "9:24", "needs the place `to`");
+    check("\"x\" : 0,", "\"x\" : 1e308,", "2:15", "a coordinate of `h1` is beyond 1e12 metres");
+    let measured = "],\n\"time\": [{\"from\": \"h1\", \"to\": \"h2\", \"aruco\": {\"mean\": 1e308}}],\n";
+    check("],\n", measured, "9:10", "the mean of `aruco` is above 1e12 seconds");
+}
+
+/// The mean speed of measured corridors applies to the others. Very long times have a mean speed that is
+/// rounded to 0.
+#[test]
+fn times_of_a_map_are_finite() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let measured = "],\n\"time\": [{\"from\": \"h1\", \"to\": \"h2\", \"aruco\": {\"mean\": 1e11}}],\n";
+    let outcome = import(directory.path(), &map().replacen("],\n", measured, 1), &[]);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let problem = std::fs::read_to_string(directory.path().join("out/problem.pddl")).expect("a problem");
+    assert!(!problem.contains("inf") && !problem.contains("NaN"), "{problem}");
 }
 
 #[test]

@@ -220,9 +220,15 @@ fn certificates_are_verified_and_shown() {
         verified_page.contains(">Verification<")
             && verified_page.contains("verified: the plan is optimal, metric 408")
     );
-    let rejected_page =
-        page(&["missions/ugv.toml", "--scenario", "bright_sun", "--certificate", &certificate]);
-    assert!(rejected_page.contains("NOT verified"), "it is about another situation");
+    let missing = folder.path().join("nope").display().to_string();
+    for (scenario, directory) in [("bright_sun", &certificate), ("kinect_failure", &missing)] {
+        let outcome =
+            metaplan(&["report", "missions/ugv.toml", "--scenario", scenario, "--certificate", directory]);
+        assert_eq!(outcome.status, 30, "{directory}: {}", outcome.stderr);
+        assert!(outcome.stdout.contains("NOT verified"), "{directory}");
+        let verdict = format!("{directory}: NOT verified");
+        assert!(outcome.stderr.contains(&verdict), "{}", outcome.stderr);
+    }
 }
 
 #[test]

@@ -182,6 +182,67 @@ fn runs_end_at_their_time_limit_and_files_are_generated() {
     assert_eq!((outcome.status, &outcome.json()["timed_out"]), (1, &1.into()), "{outcome:#?}");
 }
 
+/// Writes a study, executes it, and returns its answer and the lines of its runs.
+fn lines_of(directory: &Path, text: &str) -> (Value, Vec<Value>) {
+    let (study, results) = (directory.join("study.toml"), directory.join("results"));
+    fs::write(&study, text).expect("it can be written");
+    let outcome = sweep(&study.to_string_lossy(), &results, &[]);
+    assert_eq!(outcome.status, 1, "{outcome:#?}");
+    let lines = fs::read_to_string(results.join("shard-0001-of-0001.jsonl")).expect("lines");
+    let lines = lines.lines().skip(1).map(|line| serde_json::from_str(line).expect("JSON"));
+    (outcome.json(), lines.collect())
+}
+
+#[test]
+#[cfg(unix)]
+fn a_failed_generator_does_not_affect_other_runs() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let model = "mdp\\nmodule m\\n s : [0..1];\\n [] s=0 -> (s'=1);\\nendmodule\\n";
+    let fail = "if test {n} = 2; then echo no >&2; exit 3; fi";
+    let script = format!("{fail}; printf \"{model}\" > {{dir}}/m.prism");
+    let text = format!(
+        "command = ['check', '{{dir}}/m.prism', 'Pmax=? [ F s=1 ]']\n[vary]\nn = [1, 2, 3]\n\
+         [generate]\nrun = ['sh', '-c', \"\"\"{script}\"\"\"]\n"
+    );
+    let (answer, lines) = lines_of(folder.path(), &text);
+    assert_eq!((&answer["done"], &answer["failed"]), (&3.into(), &1.into()), "{answer:#}");
+    let failed: Vec<bool> = lines.iter().map(|line| line["answer"].is_null()).collect();
+    assert_eq!(failed, [false, true, false], "{lines:#?}");
+    let message = lines[1]["message"].as_str().expect("a message");
+    assert!(
+        message.starts_with("sh -c if test 2 = 2") && message.ends_with("exit status: 3\nno"),
+        "{message}"
+    );
+}
+
+#[test]
+#[cfg(unix)]
+fn time_limits_bind_generators() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let generate = "[generate]\nrun = ['sh', '-c', 'sleep 1000']\n";
+    let text = format!("command = ['check', '{{dir}}/m.prism', 'Pmax=? [ F s=1 ]']\n{generate}");
+    let (answer, lines) = lines_of(folder.path(), &format!("time_limit = 1\n{text}"));
+    assert_eq!((&answer["done"], &answer["timed_out"]), (&1.into(), &1.into()), "{answer:#}");
+    assert!(lines[0]["message"].as_str().is_some_and(|text| text.contains("time limit")), "{lines:#?}");
+    let folder = tempfile::tempdir().expect("a directory");
+    let study = folder.path().join("study.toml");
+    fs::write(&study, text).expect("it can be written");
+    let outcome = sweep(&study.to_string_lossy(), &folder.path().join("results"), &["--time-limit", "1"]);
+    assert_eq!((outcome.status, &outcome.json()["done"]), (1, &0.into()), "{outcome:#?}");
+}
+
+#[test]
+fn an_error_message_is_no_answer() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let mission = root().join("missions/ugv.toml");
+    let text =
+        format!("command = ['plan', '{}']\n[vary]\nfail = ['c_nope', 'c_kinect']\n", mission.display());
+    let (answer, lines) = lines_of(folder.path(), &text);
+    assert_eq!((&answer["done"], &answer["failed"]), (&2.into(), &1.into()), "{answer:#}");
+    assert!(lines[0]["answer"].is_null() && lines[1]["answer"]["format"].is_string(), "{lines:#?}");
+    assert!(lines[0]["message"].as_str().is_some_and(|text| text.contains("c_nope")), "{lines:#?}");
+}
+
 #[test]
 #[cfg(unix)]
 fn the_time_limit_of_a_run_ends_its_sat_solver() {

@@ -64,3 +64,23 @@ fn unwritable_traces_are_errors() {
     assert_eq!(output.status, 3);
     assert!(output.stderr.starts_with("error[M109]: the trace cannot be written"));
 }
+
+/// A limit on the size of files has the same effect as a full disk. The trace has several kilobytes.
+#[test]
+#[cfg(unix)]
+fn traces_that_cannot_be_completed_are_errors_and_keep_the_file() {
+    use crate::common::{outcome, program};
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("trace.json");
+    std::fs::write(&file, "[]\n").expect("written");
+    // Without the trap, the signal SIGXFSZ ends the program.
+    let script = "trap '' XFSZ; ulimit -f 1; exec \"$@\"";
+    let (program, trace) = (program().display().to_string(), file.display().to_string());
+    let arguments = ["-c", script, "sh", &program, "plan", "missions/ugv.toml", "-q", "--trace", &trace];
+    let outcome = outcome("sh".as_ref(), &root(), &arguments, "");
+    assert_eq!(outcome.status, 3, "{outcome:#?}");
+    assert!(outcome.stderr.starts_with("error[M109]: the trace cannot be written"), "{outcome:#?}");
+    assert!(!outcome.stderr.contains("panicked"), "{outcome:#?}");
+    assert_eq!(std::fs::read_to_string(&file).expect("text"), "[]\n");
+    assert_eq!(std::fs::read_dir(directory.path()).expect("a directory").count(), 1, "nothing else is left");
+}
