@@ -46,35 +46,53 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('"', "&quot;")
 }
 
-/// Opens a page at each width of [`WIDTHS`] and asserts that there are no errors. The widths are frames of
-/// one surrounding page, because the start of a browser takes seconds. Returns the results for the last
-/// width.
-fn check(browser: &Path, name: &str, page: &str) -> Value {
+/// Opens pages at each width of [`WIDTHS`]. All are frames of one surrounding page, because the start of a browser takes
+/// seconds. Returns the console messages and, for each page, the results for each width.
+fn inspect(browser: &Path, pages: &[&str]) -> (Vec<String>, Vec<Vec<Value>>) {
     let folder = tempfile::tempdir().expect("a folder");
-    let frames = WIDTHS.map(|width| {
-        format!(
-            "<iframe style=\"border:0;width:{width}px;height:900px\" srcdoc=\"{}\"></iframe>",
-            escaped(page)
-        )
+    let frames = pages.iter().flat_map(|page| {
+        WIDTHS.map(|width| {
+            format!(
+                "<iframe style=\"border:0;width:{width}px;height:900px\" srcdoc=\"{}\"></iframe>",
+                escaped(page)
+            )
+        })
     });
     let surrounding = format!(
         "<!DOCTYPE html><html><body style=\"margin:0\">{}<pre id=\"found\"></pre><script>{QUESTIONS}</script></body></html>",
-        frames.concat()
+        frames.collect::<String>()
     );
     let outer = folder.path().join("around.html");
     std::fs::write(&outer, surrounding).expect("the page is written");
     let (console, document) = open(browser, &outer, folder.path());
-    assert!(console.is_empty(), "{name}: {console:#?}");
     let answers =
         document.rsplit("<pre id=\"found\">").next().and_then(|remainder| remainder.split("</pre>").next());
     let answers = answers.expect("answers").replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
-    let mut answers: Vec<Value> =
-        serde_json::from_str(&answers).unwrap_or_else(|error| panic!("{name}: {error}: {answers}"));
-    assert_eq!(answers.len(), WIDTHS.len(), "{name}");
-    for (answer, width) in answers.iter().zip(WIDTHS) {
-        assert_eq!(answer["wrong"], Value::Array(Vec::new()), "{name} at {width} pixels");
+    let answers: Vec<Value> =
+        serde_json::from_str(&answers).unwrap_or_else(|error| panic!("{error}: {console:#?}: {answers}"));
+    assert_eq!(answers.len(), pages.len() * WIDTHS.len());
+    (console, answers.chunks(WIDTHS.len()).map(<[Value]>::to_vec).collect())
+}
+
+fn faults(results: &[Value]) -> Vec<&Value> {
+    results.iter().flat_map(|result| result["wrong"].as_array().expect("a list")).collect()
+}
+
+/// Asserts that pages have no errors at any width; `pages` contains names and texts. Returns the results for the last
+/// width.
+fn check_all(browser: &Path, pages: &[(String, String)]) -> Vec<Value> {
+    let texts: Vec<&str> = pages.iter().map(|(_, text)| text.as_str()).collect();
+    let (console, mut results) = inspect(browser, &texts);
+    let names: Vec<&str> = pages.iter().map(|(name, _)| name.as_str()).collect();
+    assert!(console.is_empty(), "{names:?}: {console:#?}");
+    for (name, results) in names.iter().zip(&results) {
+        assert!(faults(results).is_empty(), "{name} at {WIDTHS:?} pixels: {results:#?}");
     }
-    answers.pop().expect("an answer")
+    results.iter_mut().map(|results| results.pop().expect("a result")).collect()
+}
+
+fn check(browser: &Path, name: &str, page: &str) -> Value {
+    check_all(browser, &[(name.to_owned(), page.to_owned())]).pop().expect("a result")
 }
 
 fn page(arguments: &[&str]) -> String {
@@ -96,8 +114,8 @@ fn pages_of_plans_work_in_a_browser() {
         &["missions/uuv.toml", "--scenario", "murky_water"],
         &["missions/camara_like.toml", "--scenario", "kinect_failure"],
     ];
-    for arguments in missions {
-        let results = check(&browser, &arguments.join(" "), &page(arguments));
+    let pages = missions.map(|arguments| (arguments.join(" "), page(arguments)));
+    for (arguments, results) in missions.iter().zip(check_all(&browser, &pages)) {
         assert!(results["unfolding"].as_u64() > Some(1), "{arguments:?}: {results}");
         assert!(results["pictures"].as_u64() > Some(1), "{arguments:?}: {results}");
     }
@@ -108,7 +126,12 @@ fn pages_of_plans_work_in_a_browser() {
 #[test]
 fn ways_in_both_directions_and_late_steps_are_visible() {
     let Some(browser) = browser() else { return };
-    let single_page = check(&browser, "to and fro", &page(&[GREENHOUSE]));
+    let pages = [
+        ("to and fro".to_owned(), page(&[GREENHOUSE])),
+        ("beside each other".to_owned(), page(&[GREENHOUSE, "--scenario", "gusts"])),
+    ];
+    let results = check_all(&browser, &pages);
+    let [single_page, comparison_page] = &results[..] else { panic!("{results:?}") };
     let steps = metaplan(&["plan", GREENHOUSE, "--format", "json"]).json();
     let steps = steps["steps"].as_array().expect("steps").iter().zip(1..);
     let mut ways: std::collections::BTreeMap<String, Vec<String>> = std::collections::BTreeMap::new();
@@ -124,7 +147,6 @@ fn ways_in_both_directions_and_late_steps_are_visible() {
     shown_numbers.sort();
     expected.sort();
     assert_eq!(shown_numbers, expected);
-    let comparison_page = check(&browser, "beside each other", &page(&[GREENHOUSE, "--scenario", "gusts"]));
     let axis = comparison_page["axis"].as_array().expect("numbers of the axis");
     let last_number =
         axis.last().and_then(Value::as_str).and_then(|text| text.split(' ').next()).expect("a number");
@@ -144,14 +166,14 @@ fn other_pages_work_in_a_browser() {
         &["compare", "missions/camara_like.toml", "--battery-unit", "1000"],
         &["simulate", "missions/ugv.toml", "--scenario", "kinect_comes_and_goes", "--runs", "3"],
     ];
-    for arguments in commands {
-        let command: Vec<&str> = arguments.iter().copied().chain(["--report", &file, "-q"]).collect();
-        let outcome = metaplan(&command);
-        assert_eq!(outcome.status, 0, "{outcome:?}");
-        let text = std::fs::read_to_string(&file).expect("a page");
-        let results = check(&browser, &arguments.join(" "), &text);
-        assert!(results["pictures"].as_u64() > Some(0), "{arguments:?}: {results}");
-    }
+    let mut pages = commands
+        .map(|arguments| {
+            let command: Vec<&str> = arguments.iter().copied().chain(["--report", &file, "-q"]).collect();
+            let outcome = metaplan(&command);
+            assert_eq!(outcome.status, 0, "{outcome:?}");
+            (arguments.join(" "), std::fs::read_to_string(&file).expect("a page"))
+        })
+        .to_vec();
     let journal = folder.path().join("journal").display().to_string();
     let events = "{\"event\":\"component_status\",\"component\":\"c_kinect\",\"status\":\"FALSE\"}\n{\"event\":\"none\"}\n";
     let outcome = metaplan_in(&root(), &["run", "missions/ugv.toml", "--journal", &journal, "-q"], events);
@@ -160,8 +182,11 @@ fn other_pages_work_in_a_browser() {
     for kind in ["events", "inferences", "plans", "effects", "refusals"] {
         assert!(text.contains(&format!("<td>{kind}</td>")), "{kind}");
     }
-    let results = check(&browser, "journal", &text);
-    assert!(results["unfolding"].as_u64() > Some(1), "{results}");
+    pages.push(("journal".to_owned(), text));
+    let results = check_all(&browser, &pages);
+    let Some((journal, others)) = results.split_last() else { panic!("{results:?}") };
+    assert!(journal["unfolding"].as_u64() > Some(1), "{journal}");
+    assert!(others.iter().all(|page| page["pictures"].as_u64() > Some(0)), "{others:?}");
 }
 
 /// Returns the page of a run as one self-contained file: style and script inline, and the program's responses
@@ -286,40 +311,36 @@ fn page_errors_are_detected() {
     let Some(browser) = browser() else { return };
     let good = page(&["missions/ugv.toml"]);
     let paired = page(&["missions/ugv.toml", "--scenario", "kinect_failure"]);
-    let has_errors = |page: &str| {
-        let page = page.to_owned();
-        let browser = browser.clone();
-        std::panic::catch_unwind(move || check(&browser, "made wrong", &page)).is_err()
-    };
-    assert!(!has_errors(&good) && !has_errors(&paired), "nothing is wrong with pages as they are");
-    assert!(has_errors(&good.replace(" in-narrow", "")), "no drawing for a telephone");
-    assert!(has_errors(&good.replace("max-width: 100%", "min-width: 700px")), "a picture that is cut");
-    assert!(
-        has_errors(&paired.replacen(
-            "</section>",
-            "<style>.pair [data-plan=after] .axis { transform: translateX(9px) }</style></section>",
-            1
-        )),
-        "two axes"
-    );
-    assert!(
-        has_errors(&good.replace("<style>", "<style>.leg text { transform: translate(60px, 60px) }")),
-        "numbers elsewhere"
-    );
-    assert!(
-        has_errors(&good.replace("<main>", "<main><script>alert(1)</script>")),
-        "a script that is not ours"
-    );
-    assert!(
-        has_errors(&good.replace("<main>", "<main><p style=\"margin-bottom:-3rem\">on top</p>")),
-        "an overlap"
-    );
-    assert!(
-        has_errors(&good.replace("<main>", "<main><p style=\"width:2000px;max-width:none\">wide</p>")),
-        "too wide"
-    );
-    assert!(
-        has_errors(&good.replace("<main>", "<main><img src=\"https://example.org/x.png\" alt=\"\">")),
-        "the network"
-    );
+    let style = "<style>.pair [data-plan=after] .axis { transform: translateX(9px) }</style></section>";
+    let overlap = "<main><p style=\"margin-bottom:-3rem\">on top</p>";
+    let wide = "<main><p style=\"width:2000px;max-width:none\">wide</p>";
+    let damaged = [
+        ("no drawing for a telephone", good.replace(" in-narrow", "")),
+        ("a picture that is cut", good.replace("max-width: 100%", "min-width: 700px")),
+        ("two axes", paired.replacen("</section>", style, 1)),
+        (
+            "numbers elsewhere",
+            good.replace("<style>", "<style>.leg text { transform: translate(60px, 60px) }"),
+        ),
+        ("an overlap", good.replace("<main>", overlap)),
+        ("too wide", good.replace("<main>", wide)),
+    ];
+    let pages: Vec<&str> = [&good, &paired]
+        .into_iter()
+        .chain(damaged.iter().map(|(_, page)| page))
+        .map(String::as_str)
+        .collect();
+    let (_, results) = inspect(&browser, &pages);
+    assert!(results[..2].iter().all(|results| faults(results).is_empty()), "pages as they are: {results:#?}");
+    for ((fault, _), results) in damaged.iter().zip(&results[2..]) {
+        assert!(!faults(results).is_empty(), "{fault}");
+    }
+    let forbidden = [
+        ("a script that is not ours", "<script>alert(1)</script>"),
+        ("the network", "<img src=\"https://example.org/x.png\" alt=\"\">"),
+    ];
+    for (fault, element) in forbidden {
+        let (console, _) = inspect(&browser, &[&good.replace("<main>", &format!("<main>{element}"))]);
+        assert!(!console.is_empty(), "{fault}");
+    }
 }
