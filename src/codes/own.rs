@@ -101,7 +101,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M126",
         "A file of published results cannot be read.",
-        "It is not a JSON list of objects with the fields that `compare --published` reads.",
+        "It is not a JSON list of objects with the fields that `compare --published` reads, or a measure is not a number.",
         "Correct the file at the position in the message.",
     ],
     [

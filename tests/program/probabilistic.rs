@@ -16,7 +16,7 @@ use probabilistic::{Direction, Number, Problem, property};
 use serde_json::{Value, json};
 use test_resources::data;
 
-use crate::common::{metaplan, metaplan_in, root};
+use crate::common::{headlines, metaplan, metaplan_in, root};
 
 pub fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Setup) {
     let files = import_map("map", map, options).expect("a map");
@@ -412,6 +412,29 @@ fn missions_whose_goal_holds_already_are_compared() {
         let candidates = &outcome.json()["comparisons"][0]["candidates"];
         let optimum = candidates.as_array().expect("candidates").iter().find(|one| one["kind"] == "f");
         assert_eq!(optimum.expect("an optimum")["penalised_time"].as_f64(), Some(0.0), "{candidates:#}");
+    }
+}
+
+#[test]
+fn mistakes_in_arguments_of_compare_are_refused() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("published.json").display().to_string();
+    // Published rows, further arguments, expected status and part of the message.
+    let cases: [(&str, &[&str], i32, &str); 6] = [
+        (r#"[{"time":"5"}]"#, &[], 3, r#"entry 1: `time` is "5", but should be a number, or null"#),
+        (r#"[{"time":null},{"goal":true}]"#, &[], 3, "entry 2: `goal` is true, but should be a number"),
+        (r#"[{"name":5}]"#, &[], 3, "entry 1: `name` is 5, but should be a text"),
+        (r#"[{"speed":5}]"#, &[], 3, "`speed` is not a measure"),
+        ("[]", &["--pairs", "0"], 2, "--pairs"),
+        ("[]", &["--state-limit", "2"], 12, "missions/camara_like.toml: error[Q505]"),
+    ];
+    for (published, extra_arguments, status, expected) in cases {
+        std::fs::write(&file, published).expect("written");
+        let arguments = ["compare", "missions/camara_like.toml", "--published", &file];
+        let outcome = metaplan(&[&arguments[..], extra_arguments].concat());
+        assert_eq!(outcome.status, status, "{published} {extra_arguments:?}: {outcome:#?}");
+        let output = format!("{}{}", outcome.stderr, headlines(&outcome.stderr));
+        assert!(output.contains(expected), "{expected}: {outcome:#?}");
     }
 }
 
