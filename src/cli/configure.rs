@@ -107,7 +107,7 @@ impl Wanted {
             Err(wrong) => (Configurator::new(knowledge, Wishes::default())?, wrong.into_vec()),
         };
         let functions = if self.objectives.is_empty() && configurator.objectives().is_empty() {
-            configurator.functions()
+            configurator.all_functions()
         } else {
             self.objectives.clone()
         };

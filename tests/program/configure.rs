@@ -107,6 +107,41 @@ fn a_requirement_needs_an_objective_of_the_command() {
     assert_eq!(outcome.status, 0, "{}", outcome.stderr);
 }
 
+/// Runs `configure` on a small knowledge base with the statements and compares the status. Then compares the objectives
+/// with their designs in the JSON answer, and searches the text and the messages for `parts`.
+fn check(statements: &str, options: &[&str], status: i32, designs: &[(&str, Option<&str>)], parts: &[&str]) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let knowledge = format!(
+        "@prefix : <http://x.org/k#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
+        @prefix t: <http://metacontrol.org/tomasys#> .
+        <http://x.org/k> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> . {statements}"
+    );
+    std::fs::write(directory.path().join("kb.ttl"), knowledge).expect("written");
+    let arguments = [&["configure", "kb.ttl", "--rules", "coadaptation"], options].concat();
+    let outcome = metaplan_in(directory.path(), &arguments, "");
+    assert_eq!(outcome.status, status, "{options:?}: {outcome:#?}");
+    for part in parts {
+        let is_in = outcome.stdout.contains(part) || outcome.stderr.contains(part);
+        assert!(is_in, "{part}: {options:?}: {outcome:#?}");
+    }
+    let answer = metaplan_in(directory.path(), &[&arguments[..], &["--format", "json"]].concat(), "").json();
+    let choices = answer["choices"].as_array().expect("choices").iter();
+    let choices: Vec<_> = choices
+        .map(|choice| (choice["objective"].as_str().expect("a name"), choice["design"].as_str()))
+        .collect();
+    assert_eq!(choices, designs, "{options:?}: {answer:#}");
+    assert_eq!(answer["served"], status == 0, "{options:?}: {answer:#}");
+}
+
+#[test]
+fn a_function_that_no_design_solves_is_not_served() {
+    let knowledge = ":f0 a t:Function . :f1 a t:Function . :fd_0 a t:FunctionDesign ; t:solvesF :f0 .";
+    let unserved = [("o_f0", Some("fd_0")), ("o_f1", None)];
+    check(knowledge, &[], 10, &unserved, &["none can be used"]);
+    check(knowledge, &["--objective", "f0", "--objective", "f1"], 10, &unserved, &["none can be used"]);
+    check(knowledge, &["--objective", "f0"], 0, &unserved[..1], &[]);
+}
+
 #[test]
 fn the_loop_reconfigures() {
     let arguments =
