@@ -180,16 +180,21 @@ fn repairs(
         altered.is_some_and(|knowledge| is_available(&knowledge, design))
     };
     let available_changes: Vec<&Alteration> = candidates.iter().collect();
-    let without = |alteration: &Alteration| {
-        available_changes.iter().copied().filter(|other| *other != alteration).collect::<Vec<_>>()
-    };
-    // An alteration that no others can replace is in every set. If there are several alterations of a value, without
-    // the last one another one has an effect, which may be harmful.
+    let selections = selections(&available_changes);
+    let whole = selections.iter().find(|selection| suffice(selection)).cloned();
+    // An alteration that no others can replace is in every set.
     let is_only = |alteration: &Alteration| {
         available_changes.iter().filter(|other| other.name == alteration.name).count() == 1
     };
-    let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if suffice(&available_changes) {
-        let is_needed = |alteration: &&Alteration| is_only(alteration) && !suffice(&without(alteration));
+    let suffices_without = |selection: &[&Alteration], alteration: &Alteration| {
+        let others: Vec<&Alteration> =
+            selection.iter().copied().filter(|other| *other != alteration).collect();
+        suffice(&others)
+    };
+    let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if whole.is_some() {
+        let is_needed = |alteration: &&Alteration| {
+            is_only(alteration) && !selections.iter().any(|selection| suffices_without(selection, alteration))
+        };
         available_changes.iter().copied().partition(is_needed)
     } else {
         (Vec::new(), available_changes.clone())
@@ -215,13 +220,42 @@ fn repairs(
             minimal_sets.push(minimal(set, &suffice));
         }
     }
-    if minimal_sets.is_empty() && suffice(&available_changes) {
-        minimal_sets.push(minimal(available_changes, &suffice));
+    if minimal_sets.is_empty()
+        && let Some(whole) = whole
+    {
+        minimal_sets.push(minimal(whole, &suffice));
     }
     let sets = minimal_sets.into_iter().map(|set| set.into_iter().cloned().collect()).collect();
     // The empty set is tried in addition to the subsets.
     let all_tried = subsets(rest.len()).nth(MAX_TRIED - 1).is_none();
     (sets, all_tried && !has_failed.get())
+}
+
+/// Returns the largest selections of `changes` with at most one alteration of each value: all alterations of values
+/// that occur once and, for each other value, one of its alterations or none. Returns only `changes` itself if there are
+/// too many selections.
+fn selections<'a>(changes: &[&'a Alteration]) -> Vec<Vec<&'a Alteration>> {
+    let mut names: Vec<&str> = changes.iter().map(|alteration| alteration.name.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let mut selections: Vec<Vec<&Alteration>> = vec![Vec::new()];
+    for name in names {
+        let of_name: Vec<&Alteration> =
+            changes.iter().copied().filter(|alteration| alteration.name == name).collect();
+        let unchanged = if of_name.len() > 1 { selections.clone() } else { Vec::new() };
+        let extended = selections.iter().flat_map(|selection| {
+            of_name.iter().map(move |alteration| [&selection[..], &[*alteration]].concat())
+        });
+        selections = extended.chain(unchanged).collect();
+        // Each alteration is tried to be omitted from each selection.
+        if selections.len() * changes.len() > MAX_TRIED {
+            return vec![changes.to_vec()];
+        }
+    }
+    let in_order = |selection: Vec<&Alteration>| {
+        changes.iter().copied().filter(|alteration| selection.contains(alteration)).collect()
+    };
+    selections.into_iter().map(in_order).collect()
 }
 
 /// Returns the non-empty subsets of the positions 0 to `count` − 1: smaller subsets first, and subsets of one

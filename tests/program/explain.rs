@@ -121,6 +121,10 @@ const COMPUTED: &str =
     "[computed] t:isQAtype(?q, r:humidity) ^ t:hasValue(?q, ?h) ^ swrlb:multiply(?d, ?h, 2)
     ^ swrlb:greaterThan(?d, 180) -> t:fd_realisability(r:fd_first, false) .\n";
 const NEVER: &str = "[never] t:requiresC(?fd, r:c_first) -> t:fd_realisability(?fd, false) .\n";
+const DRY_AND_CALM: &str = "[dry and calm] t:hasValue(r:obs_humidity, ?h) ^ swrlb:lessThanOrEqual(?h, 7)
+    ^ t:hasValue(r:obs_wind, ?w) ^ swrlb:lessThan(?w, 7) -> t:fd_realisability(r:fd_first, false) .\n";
+const WET_AND_CALM: &str = "[wet and calm] t:hasValue(r:obs_wind, ?w) ^ swrlb:lessThan(?w, 5.5)
+    ^ t:hasValue(r:obs_humidity, ?h) ^ swrlb:greaterThan(?h, 8.5) -> t:fd_realisability(r:fd_first, false) .\n";
 
 /// Explains, with own rules in addition to the shipped ones. `arguments` follow the mission.
 fn explain_with(rules: &[&str], arguments: &str, format: &str) -> String {
@@ -184,6 +188,14 @@ fn bounds_in_own_rules_are_candidates_for_changes() {
     assert_eq!(json!([answer["unexamined"], answer["repairs"][0]["then"]["cost"]]), json!([[], 1]));
     let situation = "--set wind=7 --set humidity=60";
     check_repairs(&[DRIFT], situation, &[&["humidity below 50"], &["wind at_most 6"]]);
+}
+
+/// The wind has two bounds. Only the greater one suffices alone, and it makes the change of the humidity unnecessary.
+#[test]
+fn each_bound_of_a_measurement_is_tried_with_the_other_changes() {
+    let situation = "--set humidity=1.5 --set wind=4";
+    let expected: [&[&str]; 2] = [&["humidity above 7"], &["wind at_least 7"]];
+    check_repairs(&[DRY_AND_CALM, WET_AND_CALM], situation, &expected);
 }
 
 #[test]
