@@ -120,14 +120,23 @@ fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Ways {
     let candidates = candidates(knowledge, design, &bounds);
     let (sets, _) = repairs(knowledge, design, &candidates);
     if !sets.is_empty() {
-        return Ways { sets, unexamined };
+        return Ways { sets: nearest(&sets), unexamined };
     }
     // Rules may depend on more than the design's own requirements.
     let (sets, all_tried) = repairs(knowledge, design, &all_candidates(knowledge, candidates, &bounds));
     if sets.is_empty() && !all_tried {
         unexamined.push("some combinations of changes".to_owned());
     }
-    Ways { sets, unexamined }
+    Ways { sets: nearest(&sets), unexamined }
+}
+
+/// Returns the sets that imply no other set. For example, `above 8` is omitted if `above 7` suffices.
+fn nearest(sets: &[Vec<Alteration>]) -> Vec<Vec<Alteration>> {
+    let implies = |set: &[Alteration], other: &[Alteration]| {
+        other.iter().all(|needed| set.iter().any(|alteration| alteration.implies(needed)))
+    };
+    let is_nearest = |set: &&Vec<Alteration>| sets.iter().all(|other| other == *set || !implies(set, other));
+    sets.iter().filter(is_nearest).cloned().collect()
 }
 
 pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
@@ -148,7 +157,8 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         };
         let bounds = rule_bounds(knowledge);
         let candidates = candidates(knowledge, design, &bounds).into_iter();
-        availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
+        let ways: Vec<_> = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
+        availability.ways = nearest(&ways);
         availability.unexamined = bounds.unexamined;
         return availability;
     }
@@ -354,13 +364,18 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
     Ok(changes)
 }
 
-/// Returns alterations that may change whether a design is available: of its components, and of
-/// measurements. New measurements are at or just beyond the bounds in the design's requirements.
+/// Returns alterations that may change whether a design is available: of components, and of measurements. If the design
+/// is available, any component may fail. Otherwise, its own components may recover, and those whose status a rule reads.
+/// New measurements are at or just beyond the bounds in the design's requirements.
 /// Without a requirement for an attribute, they are around the design's estimation. Further measurements are at or just
 /// beyond bounds in rules that concern the design.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign, rules: &RuleBounds) -> Vec<Alteration> {
-    let is_own = |component: &str| design.components.iter().any(|needed| needed.iri == component);
-    let mut alterations = components(knowledge, design.available, &is_own);
+    let is_relevant = |component: &str| {
+        design.available
+            || design.components.iter().any(|needed| needed.iri == component)
+            || rules.status_reads.iter().any(|read| read.concerns(component, &design.individual.iri))
+    };
+    let mut alterations = components(knowledge, design.available, &is_relevant);
     for (attribute, from) in measured(knowledge) {
         let bounds = design.requirements.iter().filter(|requirement| requirement.attribute == attribute);
         for to in targets(bounds, &from, design.available) {
@@ -402,9 +417,9 @@ fn all_candidates(
     candidates_found
 }
 
-fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
+fn components(knowledge: &Knowledge, working: bool, is_relevant: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
     let components = knowledge.view().components().into_iter();
-    let components = components.filter(|component| is_own(&component.individual.iri));
+    let components = components.filter(|component| is_relevant(&component.individual.iri));
     let components =
         components.filter(|component| component.status.as_deref().is_some_and(is_failed) != working);
     let to = if working { Target::Failed } else { Target::Recovered };

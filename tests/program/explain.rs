@@ -126,6 +126,9 @@ const DRY_AND_CALM: &str = "[dry and calm] t:hasValue(r:obs_humidity, ?h) ^ swrl
 const WET_AND_CALM: &str = "[wet and calm] t:hasValue(r:obs_wind, ?w) ^ swrlb:lessThan(?w, 5.5)
     ^ t:hasValue(r:obs_humidity, ?h) ^ swrlb:greaterThan(?h, 8.5) -> t:fd_realisability(r:fd_first, false) .\n";
 
+const DRY_WITHOUT_SECOND: &str = "[dry without second] t:c_status(r:c_second, \"FALSE\")
+    ^ t:hasValue(r:obs_humidity, ?h) ^ swrlb:lessThan(?h, 7.5) -> t:fd_realisability(r:fd_first, false) .\n";
+
 /// Explains, with own rules in addition to the shipped ones. `arguments` follow the mission.
 fn explain_with(rules: &[&str], arguments: &str, format: &str) -> String {
     let folder = tempfile::tempdir().expect("a directory");
@@ -196,6 +199,27 @@ fn each_bound_of_a_measurement_is_tried_with_the_other_changes() {
     let situation = "--set humidity=1.5 --set wind=4";
     let expected: [&[&str]; 2] = [&["humidity above 7"], &["wind at_least 7"]];
     check_repairs(&[DRY_AND_CALM, WET_AND_CALM], situation, &expected);
+}
+
+/// Rules may read the status of a component that the design does not require.
+#[test]
+fn components_that_only_rules_name_are_tried() {
+    let expected: [&[&str]; 2] = [&["humidity at_least 7.5"], &["c_second"]];
+    check_repairs(&[DRY_WITHOUT_SECOND], "--set humidity=1.5 --fail c_second", &expected);
+    let text = explain_with(&[DRY_WITHOUT_SECOND], "fd_first --set humidity=1.5", "text");
+    for line in ["it is not available any more if\n    c_first fails: ", "\n    c_second fails: "] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+}
+
+/// A rule that cannot apply has a bound that is farther away than a sufficient one.
+#[test]
+fn only_the_nearest_sufficient_bound_is_listed() {
+    let expected: [&[&str]; 2] = [&["humidity above 7"], &["wind at_least 7"]];
+    let situation = "--set humidity=1.5 --set wind=4";
+    check_repairs(&[DRY_AND_CALM, DRY_WITHOUT_SECOND], situation, &expected);
+    let text = explain_with(&[FOG, &FOG.replace("fog", "mist").replace("90", "95")], "fd_first", "text");
+    assert!(text.contains("    humidity above 90 (now 40)") && !text.contains("above 95"), "{text}");
 }
 
 #[test]
