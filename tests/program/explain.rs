@@ -104,6 +104,24 @@ fn bounds_of_small_values_are_found() {
     assert_eq!(costs.iter().map(Value::as_f64).collect::<Vec<_>>(), [Some(2.0)], "{answer:#}");
 }
 
+/// A domain and a problem with options for the knowledge base are explained as the manifest with the same files.
+#[test]
+fn a_domain_and_a_problem_are_explained_as_a_manifest() {
+    let files = ["encodings/ugv/domain.pddl", "encodings/ugv/problem.pddl", "--kb", "ontology/kb/ugv.ttl"];
+    let without_name = |mut answer: Value| {
+        answer["mission"] = Value::Null;
+        answer
+    };
+    for design in [None, Some("fd_amcl_lidar")] {
+        let inputs = [&files[..2], design.as_slice(), &files[2..]].concat();
+        let manifest = [&["missions/ugv.toml"][..], design.as_slice()].concat();
+        assert_eq!(without_name(explain(&inputs)), without_name(explain(&manifest)), "{design:?}");
+    }
+    let outcome = metaplan(&["explain", "encodings/ugv/domain.pddl"]);
+    assert_eq!(outcome.status, 3, "{outcome:#?}");
+    assert!(outcome.stderr.contains("give the problem, too: DOMAIN PROBLEM"), "{outcome:#?}");
+}
+
 #[test]
 fn unknown_designs_are_usage_errors() {
     let outcome = metaplan(&["explain", "missions/ugv.toml", "fd_none"]);
