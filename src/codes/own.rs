@@ -213,6 +213,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Build them with `sh proved/build.sh` in the source code, and add `proved/ocaml` to PATH or use `--proved=FOLDER`.",
     ],
     [
+        "M146",
+        "Designs in use violate a joint constraint.",
+        "`configure` chooses designs only for objectives that need one. The others keep theirs, also if these use an exclusive component twice or exceed a budget.",
+        "State `o_always_improve` for an objective, so that a design is chosen for it, too.",
+    ],
+    [
         "M150",
         "A study is wrong.",
         "A key of its file has a value that cannot be varied, a placeholder has no key, or there are too many runs.",

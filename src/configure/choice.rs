@@ -47,7 +47,9 @@ pub struct Configuration {
     pub choices: Vec<Choice>,
     /// Sum of the utilities of the chosen designs.
     pub utility: BigRational,
-    /// `true` if it is proved that no other choice is better, `false` if a limit was reached before the proof. A
+    /// Joint constraints that are violated by the designs of objectives that keep their designs, as sentences.
+    pub violated: Vec<String>,
+    /// `true` if it is proved that no other choice for these objectives is better, `false` if a limit was reached before the proof. A
     /// choice is better if it serves more objectives; with equally many, if it misses fewer requirements; then if it
     /// has more utility.
     pub optimal: bool,
@@ -191,6 +193,7 @@ pub(super) fn choose(
         .zip(&positions)
         .map(|(chosen_index, at)| chosen_index.map(|chosen_index| at[chosen_index]))
         .collect();
+    let violated = violated(wishes, &fixed_offers);
     let whole = Whole {
         knowledge,
         wishes,
@@ -201,7 +204,27 @@ pub(super) fn choose(
     };
     let mut withdrawn = whole.withdrawn();
     let choices = (0..needing.len()).map(|at| whole.choice(at, withdrawn.remove(&at))).collect();
-    Ok(Configuration { choices, utility: chosen.utility, optimal: chosen.optimal })
+    Ok(Configuration { choices, utility: chosen.utility, violated, optimal: chosen.optimal })
+}
+
+/// Returns the joint constraints that the designs in use violate without the designs to choose, as sentences.
+fn violated(wishes: &Wishes, kept: &[&Offer]) -> Vec<String> {
+    let mut violated = Vec::new();
+    for component in &wishes.exclusive {
+        let users = kept.iter().filter(|offer| offer.components.contains(component));
+        let users: Vec<&str> = users.map(|offer| offer.design.as_str()).collect();
+        if users.len() > 1 {
+            violated.push(format!("{} use {component}, which only one design can use", users.join(" and ")));
+        }
+    }
+    for (budget, (attribute, most)) in wishes.budgets.iter().enumerate() {
+        let sum = kept.iter().map(|offer| &offer.choice.demands[budget]).sum::<BigRational>();
+        if sum > *most {
+            let (sum, most) = (decimal(&sum), decimal(most));
+            violated.push(format!("{attribute} is {sum} in total; the budget is {most}"));
+        }
+    }
+    violated
 }
 
 struct Offers<'a> {

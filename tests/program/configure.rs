@@ -142,6 +142,36 @@ fn a_function_that_no_design_solves_is_not_served() {
     check(knowledge, &["--objective", "f0"], 0, &unserved[..1], &[]);
 }
 
+/// The designs in use for two objectives both use `c` and need 4 of `e` in total.
+#[test]
+fn objectives_that_need_no_design_keep_theirs() {
+    let estimations = |e: &str, u: &str| {
+        format!(
+            "t:hasQAestimation [ a t:QAvalue ; t:isQAtype :e ; t:hasValue {e} ] ,
+            [ a t:QAvalue ; t:isQAtype :u ; t:hasValue {u} ] ."
+        )
+    };
+    let (large, small) = (estimations("2.0", "2.0"), estimations("0.5", "1.0"));
+    let designs = format!(
+        ":e a t:QualityAttributeType . :u a t:QualityAttributeType . :c a t:Component .
+        :f0 a t:Function . :f1 a t:Function .
+        :fd_0 a t:FunctionDesign ; t:solvesF :f0 ; t:requiresC :c ; {large}
+        :fd_0b a t:FunctionDesign ; t:solvesF :f0 ; {small}
+        :fd_1 a t:FunctionDesign ; t:solvesF :f1 ; t:requiresC :c ; {large}
+        :o0 a t:Objective ; t:typeF :f0 . :g0 a t:FunctionGrounding ; t:typeFD :fd_0 ; t:solvesO :o0 .
+        :o1 a t:Objective ; t:typeF :f1 .\n"
+    );
+    let joint = ["--most", "u", "--exclusive", "c"];
+    let both = format!("{designs}:g1 a t:FunctionGrounding ; t:typeFD :fd_1 ; t:solvesO :o1 .");
+    let warned = ["M146", "fd_0 and fd_1 use c, which only one", "e is 4 in total; the budget is 3"];
+    check(&both, &[&joint[..], &["--budget", "e=3"]].concat(), 0, &[], &warned);
+    let kept = ["proved: no choice for these objectives is better", "fd_0 uses c, which only one design"];
+    check(&designs, &joint, 10, &[("o1", None)], &kept);
+    let improved = format!("{designs}:o0 t:o_always_improve true .");
+    let chosen = [("o0", Some("fd_0b")), ("o1", Some("fd_1"))];
+    check(&improved, &joint, 0, &chosen, &["proved: no choice is better"]);
+}
+
 #[test]
 fn the_loop_reconfigures() {
     let arguments =
