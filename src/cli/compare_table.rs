@@ -41,8 +41,8 @@ pub fn published_rows(path: &std::path::Path) -> Result<Vec<Row>, Failure> {
             _ => value.is_null() || value.as_f64().is_some(),
         };
         if let Some((key, value)) = fields.iter().find(|field| !is_fitting(field)) {
-            let needed = if key == "name" { "a text" } else { "a number, or null if it is not known" };
-            let text = format!("entry {}: `{key}` is {value}, but should be {needed}", number + 1);
+            let expected = if key == "name" { "a text" } else { "a number, or null if it is not known" };
+            let text = format!("entry {}: `{key}` is {value}, but should be {expected}", number + 1);
             return Err(wrong(text).into());
         }
         rows.push(Row {

@@ -182,7 +182,12 @@ fn notes(configuration: &Configuration) -> Vec<Message> {
         let help = "state `o_always_improve` for an objective, so that a design is chosen for it, too";
         Message::warning("M146", text).with_help(help)
     });
-    violated.collect()
+    let unestimated = configuration.unestimated.iter().map(|design| {
+        let text = format!("{design}, but other designs of its function have one");
+        let help = "state the estimation in the knowledge base (`hasQAestimation`)";
+        Message::warning("M147", text).with_help(help)
+    });
+    violated.chain(unestimated).collect()
 }
 
 fn text(configuration: &Configuration, configurator: &Configurator) -> String {

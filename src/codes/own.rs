@@ -219,6 +219,12 @@ pub const CODES: &[[&str; 4]] = &[
         "State `o_always_improve` for an objective, so that a design is chosen for it, too.",
     ],
     [
+        "M147",
+        "A design has no estimation.",
+        "`configure` compares or adds the estimations of an attribute, and a design without one counts as 0. It may be preferred for this reason alone.",
+        "State the estimation of the design in the knowledge base.",
+    ],
+    [
         "M150",
         "A study is wrong.",
         "A key of its file has a value that cannot be varied, a placeholder has no key, or there are too many runs.",

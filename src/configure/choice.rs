@@ -49,9 +49,11 @@ pub struct Configuration {
     pub utility: BigRational,
     /// Joint constraints that are violated by the designs of objectives that keep their designs, as sentences.
     pub violated: Vec<String>,
-    /// `true` if it is proved that no other choice for these objectives is better, `false` if a limit was reached before the proof. A
-    /// choice is better if it serves more objectives; with equally many, if it misses fewer requirements; then if it
-    /// has more utility.
+    /// Designs without an estimation that counts as 0 although another design of the function has one, as sentences.
+    pub unestimated: BTreeSet<String>,
+    /// `true` if it is proved that no other choice for these objectives is better, `false` if a limit was reached
+    /// before the proof. A choice is better if it serves more objectives; with equally many, if it misses fewer
+    /// requirements; then if it has more utility.
     pub optimal: bool,
 }
 
@@ -118,9 +120,24 @@ struct Offer {
     missed: Vec<String>,
     choice: DesignChoice,
     components: Vec<String>,
+    /// Attributes of the utility and of budgets for which the design has no estimation.
+    unestimated: BTreeSet<String>,
 }
 
 impl Group {
+    /// Returns the usable designs without an estimation that another design of the function has, as sentences.
+    fn unestimated(&self) -> impl Iterator<Item = String> {
+        let is_estimated =
+            |attribute: &&String| self.candidates.iter().any(|offer| !offer.unestimated.contains(*attribute));
+        let usable = self.candidates.iter().filter(|offer| offer.rejections.is_empty());
+        usable.flat_map(move |offer| {
+            let attributes = offer.unestimated.iter().filter(is_estimated);
+            attributes.map(move |attribute| {
+                format!("the design `{}` has no estimation of `{attribute}`, so 0 is assumed", offer.design)
+            })
+        })
+    }
+
     fn current(&self) -> Option<&str> {
         current(&self.objective)
     }
@@ -204,7 +221,8 @@ pub(super) fn choose(
     };
     let mut withdrawn = whole.withdrawn();
     let choices = (0..needing.len()).map(|at| whole.choice(at, withdrawn.remove(&at))).collect();
-    Ok(Configuration { choices, utility: chosen.utility, violated, optimal: chosen.optimal })
+    let unestimated = needing.iter().flat_map(Group::unestimated).collect();
+    Ok(Configuration { choices, utility: chosen.utility, violated, unestimated, optimal: chosen.optimal })
 }
 
 /// Returns the joint constraints that the designs in use violate without the designs to choose, as sentences.
@@ -269,7 +287,12 @@ impl<'a> Offers<'a> {
             };
             let (design, components) = (candidate.design.name, components.clone());
             let missed = candidate.missed.iter().map(requirement_text).collect();
-            Offer { design, utility, rejections: candidate.rejections, missed, choice, components }
+            let compared =
+                attribute.into_iter().chain(self.wishes.budgets.iter().map(|(name, _)| name.as_str()));
+            let unestimated = compared.filter(|name| !estimations.contains_key(*name)).map(ToOwned::to_owned);
+            let unestimated = unestimated.collect();
+            let rejections = candidate.rejections;
+            Offer { design, utility, rejections, missed, choice, components, unestimated }
         };
         let mut candidates: Vec<Offer> = candidates_of_objective.into_iter().map(offer).collect();
         let now = current(&objective).map(ToOwned::to_owned);

@@ -197,9 +197,9 @@ fn repairs(
         available_changes.iter().filter(|other| other.name == alteration.name).count() == 1
     };
     let suffices_without = |selection: &[&Alteration], alteration: &Alteration| {
-        let others: Vec<&Alteration> =
+        let remainder: Vec<&Alteration> =
             selection.iter().copied().filter(|other| *other != alteration).collect();
-        suffice(&others)
+        suffice(&remainder)
     };
     let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if whole.is_some() {
         let is_needed = |alteration: &&Alteration| {

@@ -162,14 +162,30 @@ fn objectives_that_need_no_design_keep_theirs() {
         :o1 a t:Objective ; t:typeF :f1 .\n"
     );
     let joint = ["--most", "u", "--exclusive", "c"];
-    let both = format!("{designs}:g1 a t:FunctionGrounding ; t:typeFD :fd_1 ; t:solvesO :o1 .");
+    let grounded = format!("{designs}:g1 a t:FunctionGrounding ; t:typeFD :fd_1 ; t:solvesO :o1 .");
     let warned = ["M146", "fd_0 and fd_1 use c, which only one", "e is 4 in total; the budget is 3"];
-    check(&both, &[&joint[..], &["--budget", "e=3"]].concat(), 0, &[], &warned);
-    let kept = ["proved: no choice for these objectives is better", "fd_0 uses c, which only one design"];
-    check(&designs, &joint, 10, &[("o1", None)], &kept);
+    check(&grounded, &[&joint[..], &["--budget", "e=3"]].concat(), 0, &[], &warned);
+    let scope = ["proved: no choice for these objectives is better", "fd_0 uses c, which only one design"];
+    check(&designs, &joint, 10, &[("o1", None)], &scope);
     let improved = format!("{designs}:o0 t:o_always_improve true .");
     let chosen = [("o0", Some("fd_0b")), ("o1", Some("fd_1"))];
     check(&improved, &joint, 0, &chosen, &["proved: no choice is better"]);
+}
+
+#[test]
+fn designs_without_an_estimation_are_reported() {
+    let designs = ":u a t:QualityAttributeType . :e a t:QualityAttributeType . :f0 a t:Function .
+        :fd_known a t:FunctionDesign ; t:solvesF :f0 ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :u ; t:hasValue 1.0 ] ,
+        [ a t:QAvalue ; t:isQAtype :e ; t:hasValue 1.0 ] .
+        :fd_unknown a t:FunctionDesign ; t:solvesF :f0 .";
+    let warning = |attribute: &str| {
+        format!("warning[M147]: the design `fd_unknown` has no estimation of `{attribute}`, so 0 is assumed")
+    };
+    let (u, e) = (warning("u"), warning("e"));
+    let (known, unknown) = ([("o_f0", Some("fd_known"))], [("o_f0", Some("fd_unknown"))]);
+    check(designs, &["--least", "u"], 0, &unknown, &[&u]);
+    check(designs, &["--most", "u"], 0, &known, &[&u]);
+    check(designs, &["--most", "u", "--budget", "e=0.5"], 0, &unknown, &[&u, &e]);
 }
 
 #[test]
