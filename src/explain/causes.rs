@@ -364,15 +364,13 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
     Ok(changes)
 }
 
-/// Returns alterations that may change whether a design is available: of components, and of measurements. If the design
-/// is available, any component may fail. Otherwise, its own components may recover, and those whose status a rule reads.
-/// New measurements are at or just beyond the bounds in the design's requirements.
-/// Without a requirement for an attribute, they are around the design's estimation. Further measurements are at or just
-/// beyond bounds in rules that concern the design.
+/// Returns alterations that may change whether a design is available: of its components and of those whose status a rule
+/// reads, and of measurements. New measurements are at or just beyond the bounds in the design's requirements. Without a
+/// requirement for an attribute, they are around the design's estimation. Further measurements are at or just beyond
+/// bounds in rules that concern the design.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign, rules: &RuleBounds) -> Vec<Alteration> {
     let is_relevant = |component: &str| {
-        design.available
-            || design.components.iter().any(|needed| needed.iri == component)
+        design.components.iter().any(|needed| needed.iri == component)
             || rules.status_reads.iter().any(|read| read.concerns(component, &design.individual.iri))
     };
     let mut alterations = components(knowledge, design.available, &is_relevant);

@@ -251,14 +251,19 @@ impl Reader<'_> {
         is_examined && !concludes_value
     }
 
-    /// Returns the conditions of a rule on the status of components, without those on components that the rule requires
-    /// to be components of a design.
+    /// Returns the conditions of a rule on the status of components, without those on components that are required by
+    /// the design of the conclusion.
     fn status_reads(&self, rule: &Rule) -> Vec<StatusRead> {
         let is_atom_of = |atom: &Atom, names: &[&str]| {
             predicate_of(atom).is_some_and(|predicate| self.is_named(predicate, names))
         };
+        let subjects: Vec<Term> = rule.head.iter().flat_map(Atom::terms).collect();
         let is_required = |component: Term| {
-            rule.body.iter().any(|atom| is_atom_of(atom, REQUIRED) && atom.terms().contains(&component))
+            let is_of_subject = |terms: &[Term]| {
+                terms.contains(&component)
+                    && terms.iter().any(|term| *term != component && subjects.contains(term))
+            };
+            rule.body.iter().any(|atom| is_atom_of(atom, REQUIRED) && is_of_subject(&atom.terms()))
         };
         let components = atoms(rule).filter(|atom| is_atom_of(atom, STATUS));
         let components = components.filter_map(|atom| atom.terms().first().copied());
