@@ -21,14 +21,14 @@ pub struct ConfigureAnswer<'a> {
     format: &'static str,
     /// Whether each function that needs a design has one.
     served: bool,
-    /// Whether it is proved that no choice is better.
+    /// Whether it is proved that no choice for these objectives is better.
     optimal: bool,
     /// Total utility of the chosen designs.
     #[schemars(with = "f64")]
     utility: Value,
     /// The objectives that need a design, with the choices for them.
     choices: Vec<ChoicePart<'a>>,
-    /// Warnings about the files.
+    /// Warnings about the files and the choice.
     warnings: &'a [Message],
 }
 

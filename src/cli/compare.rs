@@ -32,7 +32,8 @@ pub struct Arguments {
     /// Component that can be lost on the way, with the probability of its loss at each move.
     #[arg(long, value_name = "COMPONENT=RATE", value_parser = loss)]
     loss: Option<(String, f64)>,
-    /// Penalty time of a mission that does not reach its goal. Default: ten times the time of the plan.
+    /// Penalty time of a mission that does not reach its goal. Default: ten times the time of the plan, at least
+    /// 10; 10000 if there is no plan.
     #[arg(long, value_name = "TIME", value_parser = penalty)]
     penalty: Option<f64>,
     /// First priority of the published procedure.
@@ -52,8 +53,8 @@ pub struct Arguments {
     time_limit: Option<Duration>,
     /// Compare for this many pairs of start and goal, evenly selected from all pairs, instead of the mission's
     /// pair.
-    #[arg(long, value_name = "N")]
-    pairs: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pairs: Option<u32>,
     /// Compare for another pair of start and goal than the mission's.
     #[arg(long, value_name = "START,GOAL", value_parser = pair, conflicts_with = "pairs")]
     pair: Option<Pair>,
@@ -186,8 +187,8 @@ fn missions(
         .flat_map(|start| (0..places).filter(move |goal| *goal != start).map(move |goal| (start, goal)))
         .collect();
     let mut chosen = Vec::new();
-    let count = count.clamp(1, pairs.len().max(1));
-    for number in 0..count.min(pairs.len()) {
+    let count = pairs.len().min(count as usize);
+    for number in 0..count {
         let (start, goal) = pairs[number * pairs.len() / count];
         chosen.push(between(start, goal)?);
     }
@@ -212,8 +213,9 @@ fn one(
         states: arguments.state_limit,
         memory: &memory_since,
     };
+    let file = arguments.inputs.first().map(|input| input.display().to_string()).unwrap_or_default();
     compared.compare(&config, report).map_err(|error| match error {
-        NoResult::Process(error) => process_failure(error, (&compared.mission.name, ""), ("property", "")),
+        NoResult::Process(error) => process_failure(error, (&file, ""), ("property", "")),
         NoResult::Planner(messages) => messages.into(),
     })
 }

@@ -36,6 +36,15 @@ pub fn published_rows(path: &std::path::Path) -> Result<Vec<Row>, Failure> {
             );
             return Err(wrong(text).into());
         }
+        let is_fitting = |(key, value): &(&String, &Value)| match key.as_str() {
+            "name" => value.is_string(),
+            _ => value.is_null() || value.as_f64().is_some(),
+        };
+        if let Some((key, value)) = fields.iter().find(|field| !is_fitting(field)) {
+            let expected = if key == "name" { "a text" } else { "a number, or null if it is not known" };
+            let text = format!("entry {}: `{key}` is {value}, but should be {expected}", number + 1);
+            return Err(wrong(text).into());
+        }
         rows.push(Row {
             pair: None,
             kind: "+".to_owned(),

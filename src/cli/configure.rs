@@ -107,7 +107,7 @@ impl Wanted {
             Err(wrong) => (Configurator::new(knowledge, Wishes::default())?, wrong.into_vec()),
         };
         let functions = if self.objectives.is_empty() && configurator.objectives().is_empty() {
-            configurator.functions()
+            configurator.all_functions()
         } else {
             self.objectives.clone()
         };
@@ -158,11 +158,14 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let configurator = wanted.configurator(knowledge)?;
     consistent(Some(configurator.knowledge()))?;
     let configuration = during("choosing", common, || configurator.choose(&guard.plan()))?;
+    let notes = notes(&configuration);
+    output::warnings(common, &notes);
     match common.format {
         Format::Json => {
-            output::json_answer(&ConfigureAnswer::new(&configuration, configurator.knowledge().warnings()));
+            let warnings = [configurator.knowledge().warnings(), &notes].concat();
+            output::json_answer(&ConfigureAnswer::new(&configuration, &warnings));
         }
-        _ => output::answer(&text(&configuration, configurator.wishes())),
+        _ => output::answer(&text(&configuration, &configurator)),
     }
     let is_served = configuration.choices.iter().all(|choice| choice.design.is_some());
     Ok(match (is_served, configuration.optimal) {
@@ -172,7 +175,22 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     })
 }
 
-fn text(configuration: &Configuration, wishes: &Wishes) -> String {
+/// Returns warnings about the choice.
+fn notes(configuration: &Configuration) -> Vec<Message> {
+    let violated = configuration.violated.iter().map(|violation| {
+        let text = format!("objectives that need no design keep theirs, but {violation}");
+        let help = "state `o_always_improve` for an objective, so that a design is chosen for it, too";
+        Message::warning("M146", text).with_help(help)
+    });
+    let unestimated = configuration.unestimated.iter().map(|design| {
+        let text = format!("{design}, but other designs of its function have one");
+        let help = "state the estimation in the knowledge base (`hasQAestimation`)";
+        Message::warning("M147", text).with_help(help)
+    });
+    violated.chain(unestimated).collect()
+}
+
+fn text(configuration: &Configuration, configurator: &Configurator) -> String {
     let mut text = String::new();
     if configuration.choices.is_empty() {
         return "no objective needs a new design\n".to_owned();
@@ -185,12 +203,15 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
         vec![choice.objective.clone(), function, design, utility, choice.need.join(", ")]
     });
     text += &output::table(&["objective", "function", "design", "utility", "in need, since"], rows);
-    let worth = match &wishes.worth {
+    let worth = match &configurator.wishes().worth {
         Worth::Mros => "as in MROS: inferred, else the estimated `performance`, else 0.001".to_owned(),
         Worth::Most(attribute) => format!("the estimated {attribute}; more is better"),
         Worth::Least(attribute) => format!("the estimated {attribute}, negated; less is better"),
     };
-    let proved = if configuration.optimal {
+    let keeps_designs = configurator.objectives().len() > configuration.choices.len();
+    let proved = if configuration.optimal && keeps_designs {
+        "proved: no choice for these objectives is better; the others keep their designs"
+    } else if configuration.optimal {
         "proved: no choice is better"
     } else {
         "not proved: a limit was reached; a better choice may exist"

@@ -1,7 +1,7 @@
 //! The command `metaplan explain`, which explains a design, a plan or a message code.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::answers::{ChangesAnswer, CodeAnswer, DesignAnswer};
 use crate::codes::{self, Code};
@@ -9,6 +9,7 @@ use crate::explain::{
     Alteration, Availability, BestPlan, DesignExplanation, SmallestChanges, Target, availability,
     smallest_changes,
 };
+use crate::file::{Kind, source};
 use crate::message::{Errors, Message, did_you_mean};
 use crate::mission::Mission;
 use clap::Args;
@@ -24,30 +25,50 @@ use crate::cli::situation::Situation;
 /// Arguments of `explain`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A mission's manifest, or a message code such as M118, which is explained with cause and remedy.
-    #[arg(value_name = "MISSION | CODE")]
-    mission: PathBuf,
-    /// A function design. Without it, explain which changes lead to another plan.
-    #[arg(value_name = "DESIGN")]
-    query: Option<String>,
+    /// A mission's manifest, or a PDDL domain and a PDDL problem; then a function design. Without the design, explain
+    /// which changes lead to another plan. Or a message code such as M118, which is explained with cause and remedy.
+    #[arg(required = true, num_args = 1..=3, value_name = "MISSION [DESIGN] | DOMAIN PROBLEM [DESIGN] | CODE")]
+    inputs: Vec<PathBuf>,
     #[command(flatten)]
     situation: Situation,
     #[command(flatten)]
     time: TimeLimit,
 }
 
+impl Arguments {
+    /// Returns the files of the mission, and the design.
+    fn files_and_design(&self) -> (&[PathBuf], Option<&Path>) {
+        match &self.inputs[..] {
+            [domain, problem] if is_pddl(domain, problem) => (&self.inputs, None),
+            [files @ .., design] if !files.is_empty() => (files, Some(design)),
+            _ => (&self.inputs, None),
+        }
+    }
+}
+
+/// Returns `true` if two arguments are a domain and a problem, not a manifest and a design.
+fn is_pddl(first: &Path, second: &Path) -> bool {
+    // Standard input can be read only once.
+    if first == Path::new("-") {
+        return second.exists();
+    }
+    source(first).is_ok_and(|file| matches!(Kind::of(file.text()), Some(Kind::Domain | Kind::Problem)))
+}
+
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    if let Some(name) = arguments.mission.to_str().filter(|name| codes::is_code(name))
-        && !arguments.mission.exists()
+    if let Some(name) = arguments.inputs.first().filter(|name| !name.exists())
+        && let Some(name) = name.to_str().filter(|name| codes::is_code(name))
     {
         return code(name, arguments, common);
     }
     let guard = arguments.time.guard(common)?;
-    let mission = arguments.situation.mission(std::slice::from_ref(&arguments.mission), common)?;
+    let (files, design) = arguments.files_and_design();
+    let mission = arguments.situation.mission(files, common)?;
     output::warnings(common, mission.warnings());
-    let complete = match &arguments.query {
-        Some(query) => {
-            let why = during("reasoning", common, || availability(&mission, query));
+    let complete = match design {
+        Some(design) => {
+            let design = design.to_string_lossy();
+            let why = during("reasoning", common, || availability(&mission, &design));
             let why = why.map_err(|messages| {
                 let exit =
                     if messages.iter().any(|m| m.code == "M112") { Exit::Usage } else { Exit::BadInput };
@@ -108,7 +129,7 @@ fn code(name: &str, arguments: &Arguments, common: &Common) -> Result<Exit, Fail
         let text = format!("there is no code `{name}`, and no file of that name{suggestion}");
         return Err(Failure::usage(Message::error("M138", text)));
     };
-    if arguments.query.is_some() || !arguments.situation.is_empty() {
+    if arguments.inputs.len() > 1 || !arguments.situation.is_empty() {
         let text = format!(
             "a code has neither a design nor a situation; use `metaplan explain {}` alone, or give a mission instead \
              of the code",

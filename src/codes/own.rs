@@ -101,7 +101,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M126",
         "A file of published results cannot be read.",
-        "It is not a JSON list of objects with the fields that `compare --published` reads.",
+        "It is not a JSON list of objects with the fields that `compare --published` reads, or a measure is not a number.",
         "Correct the file at the position in the message.",
     ],
     [
@@ -211,6 +211,18 @@ pub const CODES: &[[&str; 4]] = &[
         "The proved checker cannot be run.",
         "Its programs are not found, cannot be started, or temporary files cannot be written.",
         "Build them with `sh proved/build.sh` in the source code, and add `proved/ocaml` to PATH or use `--proved=FOLDER`.",
+    ],
+    [
+        "M146",
+        "Designs in use violate a joint constraint.",
+        "`configure` chooses designs only for objectives that need one. The others keep theirs, also if these use an exclusive component twice or exceed a budget.",
+        "State `o_always_improve` for an objective, so that a design is chosen for it, too.",
+    ],
+    [
+        "M147",
+        "A design has no estimation.",
+        "`configure` compares or adds the estimations of an attribute, and a design without one counts as 0. It may be preferred for this reason alone.",
+        "State the estimation of the design in the knowledge base.",
     ],
     [
         "M150",

@@ -157,8 +157,22 @@ impl Referee<'_> {
         play(&self.exact(), false, self.penalty, self.reserve(), &|_| false, &mut decide)
     }
 
+    /// Evaluates a plan, action by action. Each action needs the configuration that the changes before it lead to.
+    /// So after a failed change the next action cannot be executed, which ends the mission.
     pub fn play_plan(&self, plan: &[Action]) -> Result<Measures, Error> {
-        let mut decide = |_: State, step: u32| plan.get(step as usize).map(|action| action.number());
+        let mut configuration = self.mission.initial;
+        let steps = plan.iter().map(|action| {
+            let before = configuration;
+            if let Action::Change(new) = action {
+                configuration = *new;
+            }
+            (before, *action)
+        });
+        let steps: Vec<(usize, Action)> = steps.collect();
+        let mut decide = |state: State, step: u32| {
+            let (before, action) = steps.get(step as usize)?;
+            (state.situation().configuration == *before).then(|| action.number())
+        };
         // The action of a plan depends on the number of steps.
         play(&self.exact(), true, self.penalty, self.reserve(), &|_| false, &mut decide)
     }

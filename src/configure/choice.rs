@@ -47,9 +47,13 @@ pub struct Configuration {
     pub choices: Vec<Choice>,
     /// Sum of the utilities of the chosen designs.
     pub utility: BigRational,
-    /// `true` if it is proved that no other choice is better, `false` if a limit was reached before the proof. A
-    /// choice is better if it serves more objectives; with equally many, if it misses fewer requirements; then if it
-    /// has more utility.
+    /// Joint constraints that are violated by the designs of objectives that keep their designs, as sentences.
+    pub violated: Vec<String>,
+    /// Designs without an estimation that counts as 0 although another design of the function has one, as sentences.
+    pub unestimated: BTreeSet<String>,
+    /// `true` if it is proved that no other choice for these objectives is better, `false` if a limit was reached
+    /// before the proof. A choice is better if it serves more objectives; with equally many, if it misses fewer
+    /// requirements; then if it has more utility.
     pub optimal: bool,
 }
 
@@ -116,9 +120,24 @@ struct Offer {
     missed: Vec<String>,
     choice: DesignChoice,
     components: Vec<String>,
+    /// Attributes of the utility and of budgets for which the design has no estimation.
+    unestimated: BTreeSet<String>,
 }
 
 impl Group {
+    /// Returns the usable designs without an estimation that another design of the function has, as sentences.
+    fn unestimated(&self) -> impl Iterator<Item = String> {
+        let is_estimated =
+            |attribute: &&String| self.candidates.iter().any(|offer| !offer.unestimated.contains(*attribute));
+        let usable = self.candidates.iter().filter(|offer| offer.rejections.is_empty());
+        usable.flat_map(move |offer| {
+            let attributes = offer.unestimated.iter().filter(is_estimated);
+            attributes.map(move |attribute| {
+                format!("the design `{}` has no estimation of `{attribute}`, so 0 is assumed", offer.design)
+            })
+        })
+    }
+
     fn current(&self) -> Option<&str> {
         current(&self.objective)
     }
@@ -191,6 +210,7 @@ pub(super) fn choose(
         .zip(&positions)
         .map(|(chosen_index, at)| chosen_index.map(|chosen_index| at[chosen_index]))
         .collect();
+    let violated = violated(wishes, &fixed_offers);
     let whole = Whole {
         knowledge,
         wishes,
@@ -201,7 +221,28 @@ pub(super) fn choose(
     };
     let mut withdrawn = whole.withdrawn();
     let choices = (0..needing.len()).map(|at| whole.choice(at, withdrawn.remove(&at))).collect();
-    Ok(Configuration { choices, utility: chosen.utility, optimal: chosen.optimal })
+    let unestimated = needing.iter().flat_map(Group::unestimated).collect();
+    Ok(Configuration { choices, utility: chosen.utility, violated, unestimated, optimal: chosen.optimal })
+}
+
+/// Returns the joint constraints that the designs in use violate without the designs to choose, as sentences.
+fn violated(wishes: &Wishes, kept: &[&Offer]) -> Vec<String> {
+    let mut violated = Vec::new();
+    for component in &wishes.exclusive {
+        let users = kept.iter().filter(|offer| offer.components.contains(component));
+        let users: Vec<&str> = users.map(|offer| offer.design.as_str()).collect();
+        if users.len() > 1 {
+            violated.push(format!("{} use {component}, which only one design can use", users.join(" and ")));
+        }
+    }
+    for (budget, (attribute, most)) in wishes.budgets.iter().enumerate() {
+        let sum = kept.iter().map(|offer| &offer.choice.demands[budget]).sum::<BigRational>();
+        if sum > *most {
+            let (sum, most) = (decimal(&sum), decimal(most));
+            violated.push(format!("{attribute} is {sum} in total; the budget is {most}"));
+        }
+    }
+    violated
 }
 
 struct Offers<'a> {
@@ -246,7 +287,12 @@ impl<'a> Offers<'a> {
             };
             let (design, components) = (candidate.design.name, components.clone());
             let missed = candidate.missed.iter().map(requirement_text).collect();
-            Offer { design, utility, rejections: candidate.rejections, missed, choice, components }
+            let compared =
+                attribute.into_iter().chain(self.wishes.budgets.iter().map(|(name, _)| name.as_str()));
+            let unestimated = compared.filter(|name| !estimations.contains_key(*name)).map(ToOwned::to_owned);
+            let unestimated = unestimated.collect();
+            let rejections = candidate.rejections;
+            Offer { design, utility, rejections, missed, choice, components, unestimated }
         };
         let mut candidates: Vec<Offer> = candidates_of_objective.into_iter().map(offer).collect();
         let now = current(&objective).map(ToOwned::to_owned);

@@ -119,6 +119,13 @@ impl Configurator {
         names
     }
 
+    /// Returns the sorted local names of all functions, including those that no design solves.
+    pub fn all_functions(&self) -> Vec<String> {
+        let stated = self.knowledge.view().functions().into_iter().map(|function| function.name);
+        let names: BTreeSet<String> = stated.chain(self.functions()).collect();
+        names.into_iter().collect()
+    }
+
     /// Adds an objective.
     ///
     /// # Errors

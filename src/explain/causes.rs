@@ -120,14 +120,23 @@ fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Ways {
     let candidates = candidates(knowledge, design, &bounds);
     let (sets, _) = repairs(knowledge, design, &candidates);
     if !sets.is_empty() {
-        return Ways { sets, unexamined };
+        return Ways { sets: nearest(&sets), unexamined };
     }
     // Rules may depend on more than the design's own requirements.
     let (sets, all_tried) = repairs(knowledge, design, &all_candidates(knowledge, candidates, &bounds));
     if sets.is_empty() && !all_tried {
         unexamined.push("some combinations of changes".to_owned());
     }
-    Ways { sets, unexamined }
+    Ways { sets: nearest(&sets), unexamined }
+}
+
+/// Returns the sets that imply no other set. For example, `above 8` is omitted if `above 7` suffices.
+fn nearest(sets: &[Vec<Alteration>]) -> Vec<Vec<Alteration>> {
+    let implies = |set: &[Alteration], other: &[Alteration]| {
+        other.iter().all(|needed| set.iter().any(|alteration| alteration.implies(needed)))
+    };
+    let is_nearest = |set: &&Vec<Alteration>| sets.iter().all(|other| other == *set || !implies(set, other));
+    sets.iter().filter(is_nearest).cloned().collect()
 }
 
 pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
@@ -148,7 +157,8 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         };
         let bounds = rule_bounds(knowledge);
         let candidates = candidates(knowledge, design, &bounds).into_iter();
-        availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
+        let ways: Vec<_> = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
+        availability.ways = nearest(&ways);
         availability.unexamined = bounds.unexamined;
         return availability;
     }
@@ -180,16 +190,21 @@ fn repairs(
         altered.is_some_and(|knowledge| is_available(&knowledge, design))
     };
     let available_changes: Vec<&Alteration> = candidates.iter().collect();
-    let without = |alteration: &Alteration| {
-        available_changes.iter().copied().filter(|other| *other != alteration).collect::<Vec<_>>()
-    };
-    // An alteration that no others can replace is in every set. If there are several alterations of a value, without
-    // the last one another one has an effect, which may be harmful.
+    let selections = selections(&available_changes);
+    let whole = selections.iter().find(|selection| suffice(selection)).cloned();
+    // An alteration that no others can replace is in every set.
     let is_only = |alteration: &Alteration| {
         available_changes.iter().filter(|other| other.name == alteration.name).count() == 1
     };
-    let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if suffice(&available_changes) {
-        let is_needed = |alteration: &&Alteration| is_only(alteration) && !suffice(&without(alteration));
+    let suffices_without = |selection: &[&Alteration], alteration: &Alteration| {
+        let remainder: Vec<&Alteration> =
+            selection.iter().copied().filter(|other| *other != alteration).collect();
+        suffice(&remainder)
+    };
+    let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if whole.is_some() {
+        let is_needed = |alteration: &&Alteration| {
+            is_only(alteration) && !selections.iter().any(|selection| suffices_without(selection, alteration))
+        };
         available_changes.iter().copied().partition(is_needed)
     } else {
         (Vec::new(), available_changes.clone())
@@ -215,13 +230,42 @@ fn repairs(
             minimal_sets.push(minimal(set, &suffice));
         }
     }
-    if minimal_sets.is_empty() && suffice(&available_changes) {
-        minimal_sets.push(minimal(available_changes, &suffice));
+    if minimal_sets.is_empty()
+        && let Some(whole) = whole
+    {
+        minimal_sets.push(minimal(whole, &suffice));
     }
     let sets = minimal_sets.into_iter().map(|set| set.into_iter().cloned().collect()).collect();
     // The empty set is tried in addition to the subsets.
     let all_tried = subsets(rest.len()).nth(MAX_TRIED - 1).is_none();
     (sets, all_tried && !has_failed.get())
+}
+
+/// Returns the largest selections of `changes` with at most one alteration of each value: all alterations of values
+/// that occur once and, for each other value, one of its alterations or none. Returns only `changes` itself if there are
+/// too many selections.
+fn selections<'a>(changes: &[&'a Alteration]) -> Vec<Vec<&'a Alteration>> {
+    let mut names: Vec<&str> = changes.iter().map(|alteration| alteration.name.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let mut selections: Vec<Vec<&Alteration>> = vec![Vec::new()];
+    for name in names {
+        let of_name: Vec<&Alteration> =
+            changes.iter().copied().filter(|alteration| alteration.name == name).collect();
+        let unchanged = if of_name.len() > 1 { selections.clone() } else { Vec::new() };
+        let extended = selections.iter().flat_map(|selection| {
+            of_name.iter().map(move |alteration| [&selection[..], &[*alteration]].concat())
+        });
+        selections = extended.chain(unchanged).collect();
+        // Each alteration is tried to be omitted from each selection.
+        if selections.len() * changes.len() > MAX_TRIED {
+            return vec![changes.to_vec()];
+        }
+    }
+    let in_order = |selection: Vec<&Alteration>| {
+        changes.iter().copied().filter(|alteration| selection.contains(alteration)).collect()
+    };
+    selections.into_iter().map(in_order).collect()
 }
 
 /// Returns the non-empty subsets of the positions 0 to `count` − 1: smaller subsets first, and subsets of one
@@ -320,13 +364,16 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
     Ok(changes)
 }
 
-/// Returns alterations that may change whether a design is available: of its components, and of
-/// measurements. New measurements are at or just beyond the bounds in the design's requirements.
-/// Without a requirement for an attribute, they are around the design's estimation. Further measurements are at or just
-/// beyond bounds in rules that concern the design.
+/// Returns alterations that may change whether a design is available: of its components and of those whose status a rule
+/// reads, and of measurements. New measurements are at or just beyond the bounds in the design's requirements. Without a
+/// requirement for an attribute, they are around the design's estimation. Further measurements are at or just beyond
+/// bounds in rules that concern the design.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign, rules: &RuleBounds) -> Vec<Alteration> {
-    let is_own = |component: &str| design.components.iter().any(|needed| needed.iri == component);
-    let mut alterations = components(knowledge, design.available, &is_own);
+    let is_relevant = |component: &str| {
+        design.components.iter().any(|needed| needed.iri == component)
+            || rules.status_reads.iter().any(|read| read.concerns(component, &design.individual.iri))
+    };
+    let mut alterations = components(knowledge, design.available, &is_relevant);
     for (attribute, from) in measured(knowledge) {
         let bounds = design.requirements.iter().filter(|requirement| requirement.attribute == attribute);
         for to in targets(bounds, &from, design.available) {
@@ -368,9 +415,9 @@ fn all_candidates(
     candidates_found
 }
 
-fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
+fn components(knowledge: &Knowledge, working: bool, is_relevant: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
     let components = knowledge.view().components().into_iter();
-    let components = components.filter(|component| is_own(&component.individual.iri));
+    let components = components.filter(|component| is_relevant(&component.individual.iri));
     let components =
         components.filter(|component| component.status.as_deref().is_some_and(is_failed) != working);
     let to = if working { Target::Failed } else { Target::Recovered };

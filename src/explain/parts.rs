@@ -28,6 +28,13 @@ pub struct Alteration {
     pub to: Target,
 }
 
+impl Alteration {
+    /// Returns `true` if the other alteration holds, too, once this one holds.
+    pub(super) fn implies(&self, other: &Self) -> bool {
+        self.name == other.name && self.to.implies(&other.to)
+    }
+}
+
 /// A set of alterations that together make the explained design available or unavailable.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Repair {
@@ -71,6 +78,19 @@ pub enum Target {
 }
 
 impl Target {
+    /// Returns `true` if every value that meets this target meets `other`, too.
+    fn implies(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::AtLeast(bound), Self::Above(limit)) => bound > limit,
+            (Self::AtLeast(bound) | Self::Above(bound), Self::AtLeast(limit))
+            | (Self::Above(bound), Self::Above(limit)) => bound >= limit,
+            (Self::AtMost(bound), Self::Below(limit)) => bound < limit,
+            (Self::AtMost(bound) | Self::Below(bound), Self::AtMost(limit))
+            | (Self::Below(bound), Self::Below(limit)) => bound <= limit,
+            _ => self == other,
+        }
+    }
+
     /// Returns a value that meets the target: the bound itself or, if the bound is strict, a value
     /// that differs from it by [`little`]. Returns 0 for components.
     pub(super) fn example(&self) -> BigRational {

@@ -2,7 +2,8 @@
 //!
 //! A comparison is examined if one side is a measured value and the other side is a number in the rule. Comparisons
 //! with the bounds or the estimations of a design are examined elsewhere. Rules with other comparisons of measured
-//! values, such as comparisons of computed values, are listed by name.
+//! values, such as comparisons of computed values, are listed by name. Components whose status rules read are listed,
+//! too.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,11 +18,15 @@ use crate::knowledge::{Knowledge, VALUE_PROPERTIES, ValueRead};
 
 const BOUND: &[&str] = &["hasMinimum", "hasMaximum"];
 const AVAILABILITY: &[&str] = &["fd_realisability", "fd_available"];
+const STATUS: &[&str] = &["c_status"];
+const REQUIRED: &[&str] = &["requiresC", "requiredBy"];
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct RuleBounds {
     /// Comparisons of measured values with numbers.
     pub bounds: Vec<RuleBound>,
+    /// Components whose status is read by rules that can affect the availability of designs.
+    pub status_reads: Vec<StatusRead>,
     /// Rules that can affect the availability of designs and have comparisons that are not in `bounds`, in words.
     pub unexamined: Vec<String>,
 }
@@ -44,6 +49,23 @@ impl RuleBound {
     }
 }
 
+/// A condition of a rule on the status of a component that is not necessarily one of the design's own components.
+#[derive(Debug, Clone)]
+pub(super) struct StatusRead {
+    /// IRI of the component; `None` if the condition may concern any component.
+    component: Option<String>,
+    /// IRIs of the designs about which the rule concludes; `None` if it may conclude about any design.
+    designs: Option<BTreeSet<String>>,
+}
+
+impl StatusRead {
+    /// Returns `true` if the status of a component can affect the availability of a design.
+    pub fn concerns(&self, component: &str, design: &str) -> bool {
+        self.component.as_ref().is_none_or(|name| name == component)
+            && self.designs.as_ref().is_none_or(|designs| designs.contains(design))
+    }
+}
+
 pub(super) fn rule_bounds(knowledge: &Knowledge) -> RuleBounds {
     let measurements = knowledge.view().measurements();
     let engine = knowledge.engine();
@@ -52,18 +74,21 @@ pub(super) fn rule_bounds(knowledge: &Knowledge) -> RuleBounds {
     let reader = Reader { engine, rules };
     let deciding = reader.deciding();
     let carriers = reader.carriers();
-    let (mut bounds, mut unexamined) = (Vec::new(), BTreeSet::new());
+    let (mut bounds, mut status_reads, mut unexamined) = (Vec::new(), Vec::new(), BTreeSet::new());
     for reads in &reader.rules {
         let rule = reads.rule;
         let is_deciding = concluded(rule).any(|predicate| deciding.contains(&predicate));
         let is_examined = reader.read(reads, &carriers, is_deciding, &mut bounds);
+        if is_deciding {
+            status_reads.extend(reader.status_reads(rule));
+        }
         if is_deciding && !is_examined {
             let label = rule.identity.label.as_ref().map(ToString::to_string);
             unexamined.insert(label.unwrap_or_else(|| rule.identity.to_string()));
         }
     }
     let words = |rule: &String| format!("comparisons of measurements in the rule `{rule}`");
-    RuleBounds { bounds, unexamined: unexamined.iter().map(words).collect() }
+    RuleBounds { bounds, status_reads, unexamined: unexamined.iter().map(words).collect() }
 }
 
 struct RuleReads<'a> {
@@ -224,6 +249,34 @@ impl Reader<'_> {
                 && contain(&dependent, &atom.terms())
         });
         is_examined && !concludes_value
+    }
+
+    /// Returns the conditions of a rule on the status of components, without those on components that are required by
+    /// the design of the conclusion.
+    fn status_reads(&self, rule: &Rule) -> Vec<StatusRead> {
+        let is_atom_of = |atom: &Atom, names: &[&str]| {
+            predicate_of(atom).is_some_and(|predicate| self.is_named(predicate, names))
+        };
+        let subjects: Vec<Term> = rule.head.iter().flat_map(Atom::terms).collect();
+        let is_required = |component: Term| {
+            let is_of_subject = |terms: &[Term]| {
+                terms.contains(&component)
+                    && terms.iter().any(|term| *term != component && subjects.contains(term))
+            };
+            rule.body.iter().any(|atom| is_atom_of(atom, REQUIRED) && is_of_subject(&atom.terms()))
+        };
+        let components = atoms(rule).filter(|atom| is_atom_of(atom, STATUS));
+        let components = components.filter_map(|atom| atom.terms().first().copied());
+        let designs = self.designs(rule);
+        let read = |term: Term| {
+            let component = match term {
+                Term::Constant(name) => Some(self.engine.symbols().value(name).as_name()?.to_owned()),
+                Term::Variable(_) if is_required(term) => return None,
+                Term::Variable(_) => None,
+            };
+            Some(StatusRead { component, designs: designs.clone() })
+        };
+        components.filter_map(read).collect()
     }
 
     /// Returns the IRIs of the designs whose availability a rule concludes, if it concludes nothing else and names

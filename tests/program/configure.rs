@@ -107,6 +107,87 @@ fn a_requirement_needs_an_objective_of_the_command() {
     assert_eq!(outcome.status, 0, "{}", outcome.stderr);
 }
 
+/// Runs `configure` on a small knowledge base with the statements and compares the status. Then compares the objectives
+/// with their designs in the JSON answer, and searches the text and the messages for `parts`.
+fn check(statements: &str, options: &[&str], status: i32, designs: &[(&str, Option<&str>)], parts: &[&str]) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let knowledge = format!(
+        "@prefix : <http://x.org/k#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
+        @prefix t: <http://metacontrol.org/tomasys#> .
+        <http://x.org/k> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> . {statements}"
+    );
+    std::fs::write(directory.path().join("kb.ttl"), knowledge).expect("written");
+    let arguments = [&["configure", "kb.ttl", "--rules", "coadaptation"], options].concat();
+    let outcome = metaplan_in(directory.path(), &arguments, "");
+    assert_eq!(outcome.status, status, "{options:?}: {outcome:#?}");
+    for part in parts {
+        let is_in = outcome.stdout.contains(part) || outcome.stderr.contains(part);
+        assert!(is_in, "{part}: {options:?}: {outcome:#?}");
+    }
+    let answer = metaplan_in(directory.path(), &[&arguments[..], &["--format", "json"]].concat(), "").json();
+    let choices = answer["choices"].as_array().expect("choices").iter();
+    let choices: Vec<_> = choices
+        .map(|choice| (choice["objective"].as_str().expect("a name"), choice["design"].as_str()))
+        .collect();
+    assert_eq!(choices, designs, "{options:?}: {answer:#}");
+    assert_eq!(answer["served"], status == 0, "{options:?}: {answer:#}");
+}
+
+#[test]
+fn a_function_that_no_design_solves_is_not_served() {
+    let knowledge = ":f0 a t:Function . :f1 a t:Function . :fd_0 a t:FunctionDesign ; t:solvesF :f0 .";
+    let unserved = [("o_f0", Some("fd_0")), ("o_f1", None)];
+    check(knowledge, &[], 10, &unserved, &["none can be used"]);
+    check(knowledge, &["--objective", "f0", "--objective", "f1"], 10, &unserved, &["none can be used"]);
+    check(knowledge, &["--objective", "f0"], 0, &unserved[..1], &[]);
+}
+
+/// The designs in use for two objectives both use `c` and need 4 of `e` in total.
+#[test]
+fn objectives_that_need_no_design_keep_theirs() {
+    let estimations = |e: &str, u: &str| {
+        format!(
+            "t:hasQAestimation [ a t:QAvalue ; t:isQAtype :e ; t:hasValue {e} ] ,
+            [ a t:QAvalue ; t:isQAtype :u ; t:hasValue {u} ] ."
+        )
+    };
+    let (large, small) = (estimations("2.0", "2.0"), estimations("0.5", "1.0"));
+    let designs = format!(
+        ":e a t:QualityAttributeType . :u a t:QualityAttributeType . :c a t:Component .
+        :f0 a t:Function . :f1 a t:Function .
+        :fd_0 a t:FunctionDesign ; t:solvesF :f0 ; t:requiresC :c ; {large}
+        :fd_0b a t:FunctionDesign ; t:solvesF :f0 ; {small}
+        :fd_1 a t:FunctionDesign ; t:solvesF :f1 ; t:requiresC :c ; {large}
+        :o0 a t:Objective ; t:typeF :f0 . :g0 a t:FunctionGrounding ; t:typeFD :fd_0 ; t:solvesO :o0 .
+        :o1 a t:Objective ; t:typeF :f1 .\n"
+    );
+    let joint = ["--most", "u", "--exclusive", "c"];
+    let grounded = format!("{designs}:g1 a t:FunctionGrounding ; t:typeFD :fd_1 ; t:solvesO :o1 .");
+    let warned = ["M146", "fd_0 and fd_1 use c, which only one", "e is 4 in total; the budget is 3"];
+    check(&grounded, &[&joint[..], &["--budget", "e=3"]].concat(), 0, &[], &warned);
+    let scope = ["proved: no choice for these objectives is better", "fd_0 uses c, which only one design"];
+    check(&designs, &joint, 10, &[("o1", None)], &scope);
+    let improved = format!("{designs}:o0 t:o_always_improve true .");
+    let chosen = [("o0", Some("fd_0b")), ("o1", Some("fd_1"))];
+    check(&improved, &joint, 0, &chosen, &["proved: no choice is better"]);
+}
+
+#[test]
+fn designs_without_an_estimation_are_reported() {
+    let designs = ":u a t:QualityAttributeType . :e a t:QualityAttributeType . :f0 a t:Function .
+        :fd_known a t:FunctionDesign ; t:solvesF :f0 ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :u ; t:hasValue 1.0 ] ,
+        [ a t:QAvalue ; t:isQAtype :e ; t:hasValue 1.0 ] .
+        :fd_unknown a t:FunctionDesign ; t:solvesF :f0 .";
+    let warning = |attribute: &str| {
+        format!("warning[M147]: the design `fd_unknown` has no estimation of `{attribute}`, so 0 is assumed")
+    };
+    let (u, e) = (warning("u"), warning("e"));
+    let (known, unknown) = ([("o_f0", Some("fd_known"))], [("o_f0", Some("fd_unknown"))]);
+    check(designs, &["--least", "u"], 0, &unknown, &[&u]);
+    check(designs, &["--most", "u"], 0, &known, &[&u]);
+    check(designs, &["--most", "u", "--budget", "e=0.5"], 0, &unknown, &[&u, &e]);
+}
+
 #[test]
 fn the_loop_reconfigures() {
     let arguments =

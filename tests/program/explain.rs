@@ -104,6 +104,24 @@ fn bounds_of_small_values_are_found() {
     assert_eq!(costs.iter().map(Value::as_f64).collect::<Vec<_>>(), [Some(2.0)], "{answer:#}");
 }
 
+/// A domain and a problem with options for the knowledge base are explained as the manifest with the same files.
+#[test]
+fn a_domain_and_a_problem_are_explained_as_a_manifest() {
+    let files = ["encodings/ugv/domain.pddl", "encodings/ugv/problem.pddl", "--kb", "ontology/kb/ugv.ttl"];
+    let without_name = |mut answer: Value| {
+        answer["mission"] = Value::Null;
+        answer
+    };
+    for design in [None, Some("fd_amcl_lidar")] {
+        let inputs = [&files[..2], design.as_slice(), &files[2..]].concat();
+        let manifest = [&["missions/ugv.toml"][..], design.as_slice()].concat();
+        assert_eq!(without_name(explain(&inputs)), without_name(explain(&manifest)), "{design:?}");
+    }
+    let outcome = metaplan(&["explain", "encodings/ugv/domain.pddl"]);
+    assert_eq!(outcome.status, 3, "{outcome:#?}");
+    assert!(outcome.stderr.contains("give the problem, too: DOMAIN PROBLEM"), "{outcome:#?}");
+}
+
 #[test]
 fn unknown_designs_are_usage_errors() {
     let outcome = metaplan(&["explain", "missions/ugv.toml", "fd_none"]);
@@ -121,6 +139,13 @@ const COMPUTED: &str =
     "[computed] t:isQAtype(?q, r:humidity) ^ t:hasValue(?q, ?h) ^ swrlb:multiply(?d, ?h, 2)
     ^ swrlb:greaterThan(?d, 180) -> t:fd_realisability(r:fd_first, false) .\n";
 const NEVER: &str = "[never] t:requiresC(?fd, r:c_first) -> t:fd_realisability(?fd, false) .\n";
+const DRY_AND_CALM: &str = "[dry and calm] t:hasValue(r:obs_humidity, ?h) ^ swrlb:lessThanOrEqual(?h, 7)
+    ^ t:hasValue(r:obs_wind, ?w) ^ swrlb:lessThan(?w, 7) -> t:fd_realisability(r:fd_first, false) .\n";
+const WET_AND_CALM: &str = "[wet and calm] t:hasValue(r:obs_wind, ?w) ^ swrlb:lessThan(?w, 5.5)
+    ^ t:hasValue(r:obs_humidity, ?h) ^ swrlb:greaterThan(?h, 8.5) -> t:fd_realisability(r:fd_first, false) .\n";
+
+const DRY_WITHOUT_SECOND: &str = "[dry without second] t:c_status(r:c_second, \"FALSE\")
+    ^ t:hasValue(r:obs_humidity, ?h) ^ swrlb:lessThan(?h, 7.5) -> t:fd_realisability(r:fd_first, false) .\n";
 
 /// Explains, with own rules in addition to the shipped ones. `arguments` follow the mission.
 fn explain_with(rules: &[&str], arguments: &str, format: &str) -> String {
@@ -184,6 +209,35 @@ fn bounds_in_own_rules_are_candidates_for_changes() {
     assert_eq!(json!([answer["unexamined"], answer["repairs"][0]["then"]["cost"]]), json!([[], 1]));
     let situation = "--set wind=7 --set humidity=60";
     check_repairs(&[DRIFT], situation, &[&["humidity below 50"], &["wind at_most 6"]]);
+}
+
+/// The wind has two bounds. Only the greater one suffices alone, and it makes the change of the humidity unnecessary.
+#[test]
+fn each_bound_of_a_measurement_is_tried_with_the_other_changes() {
+    let situation = "--set humidity=1.5 --set wind=4";
+    let expected: [&[&str]; 2] = [&["humidity above 7"], &["wind at_least 7"]];
+    check_repairs(&[DRY_AND_CALM, WET_AND_CALM], situation, &expected);
+}
+
+/// Rules may read the status of a component that the design does not require.
+#[test]
+fn components_that_only_rules_name_are_tried() {
+    let expected: [&[&str]; 2] = [&["humidity at_least 7.5"], &["c_second"]];
+    check_repairs(&[DRY_WITHOUT_SECOND], "--set humidity=1.5 --fail c_second", &expected);
+    let text = explain_with(&[DRY_WITHOUT_SECOND], "fd_first --set humidity=1.5", "text");
+    for line in ["it is not available any more if\n    c_first fails: ", "\n    c_second fails: "] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+}
+
+/// A rule that cannot apply has a bound that is farther away than a sufficient one.
+#[test]
+fn only_the_nearest_sufficient_bound_is_listed() {
+    let expected: [&[&str]; 2] = [&["humidity above 7"], &["wind at_least 7"]];
+    let situation = "--set humidity=1.5 --set wind=4";
+    check_repairs(&[DRY_AND_CALM, DRY_WITHOUT_SECOND], situation, &expected);
+    let text = explain_with(&[FOG, &FOG.replace("fog", "mist").replace("90", "95")], "fd_first", "text");
+    assert!(text.contains("    humidity above 90 (now 40)") && !text.contains("above 95"), "{text}");
 }
 
 #[test]

@@ -16,7 +16,7 @@ use probabilistic::{Direction, Number, Problem, property};
 use serde_json::{Value, json};
 use test_resources::data;
 
-use crate::common::{metaplan, metaplan_in, root};
+use crate::common::{headlines, metaplan, metaplan_in, root};
 
 pub fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Setup) {
     let files = import_map("map", map, options).expect("a map");
@@ -349,6 +349,61 @@ fn missions_without_places_are_compared() {
     assert_eq!(first["replanned"], first["solved_again"], "{answer:#}");
 }
 
+/// The change from `fd_1` to `fd_0` succeeds with probability 1/2. After a failed change the robot has `fd_1`, and the
+/// plan's move with `fd_0` cannot be executed.
+#[test]
+fn a_failed_change_of_configuration_ends_a_plan_that_is_not_replanned() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).expect("written");
+    write(
+        "domain.pddl",
+        "(define (domain robot) (:requirements :typing :equality :negative-preconditions :numeric-fluents)
+           (:types waypoint functiondesign)
+           (:predicates (robot_at ?at - waypoint) (configured ?fd - functiondesign)
+             (fd_available ?fd - functiondesign) (suits ?fd - functiondesign ?from ?to - waypoint))
+           (:functions (time ?from ?to - waypoint ?fd - functiondesign) (switch_time ?old ?new - functiondesign)
+             (switch_success ?old ?new - functiondesign) (total_time))
+           (:action move :parameters (?fd - functiondesign ?from ?to - waypoint)
+             :precondition (and (robot_at ?from) (configured ?fd) (fd_available ?fd) (suits ?fd ?from ?to))
+             :effect (and (not (robot_at ?from)) (robot_at ?to) (increase (total_time) (time ?from ?to ?fd))))
+           (:action reconfigure :parameters (?old ?new - functiondesign)
+             :precondition (and (configured ?old) (fd_available ?new) (not (= ?old ?new)))
+             :effect (and (not (configured ?old)) (configured ?new)
+               (increase (total_time) (switch_time ?old ?new)))))",
+    );
+    write(
+        "problem.pddl",
+        "(define (problem p) (:domain robot)
+           (:objects p0 p1 - waypoint fd_0 fd_1 - functiondesign)
+           (:init (robot_at p0) (configured fd_1) (fd_available fd_0) (fd_available fd_1) (= (total_time) 0)
+             (suits fd_0 p0 p1) (= (time p0 p1 fd_0) 1) (suits fd_1 p0 p1) (= (time p0 p1 fd_1) 3)
+             (= (switch_time fd_0 fd_1) 0) (= (switch_time fd_1 fd_0) 0) (= (switch_success fd_1 fd_0) 0.5))
+           (:goal (robot_at p1)) (:metric minimize (total_time)))",
+    );
+    let outcome =
+        metaplan_in(directory.path(), &["compare", "domain.pddl", "problem.pddl", "--format", "json"], "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let answer = &outcome.json()["comparisons"][0];
+    // The plan takes 1, so a failed mission costs 10. The other candidates repeat the change until it succeeds.
+    for (kind, goal, time, penalised) in [
+        ("a", 1.0, 1.0, 1.0),
+        ("b", 0.5, 0.5, 5.5),
+        ("c", 1.0, 1.0, 1.0),
+        ("d", 0.5, 0.5, 5.5),
+        ("e", 0.5, 0.5, 5.5),
+    ] {
+        let candidates = answer["candidates"].as_array().expect("candidates");
+        let candidate = candidates.iter().find(|candidate| candidate["kind"] == kind).expect("a candidate");
+        for (measure, expected) in [("goal", goal), ("time", time), ("penalised_time", penalised)] {
+            let value = candidate[measure].as_f64().expect("a number");
+            assert!((value - expected).abs() < 1e-9, "{kind}: {measure} {value}");
+        }
+    }
+    for price in ["price_of_open_loop", "value_of_replanning"] {
+        assert!((answer[price].as_f64().expect("a number") - 4.5).abs() < 1e-9, "{answer:#}");
+    }
+}
+
 #[test]
 fn missions_whose_goal_holds_already_are_compared() {
     for file in ["missions/ugv.toml", "missions/ugv_plain.toml"] {
@@ -357,6 +412,29 @@ fn missions_whose_goal_holds_already_are_compared() {
         let candidates = &outcome.json()["comparisons"][0]["candidates"];
         let optimum = candidates.as_array().expect("candidates").iter().find(|one| one["kind"] == "f");
         assert_eq!(optimum.expect("an optimum")["penalised_time"].as_f64(), Some(0.0), "{candidates:#}");
+    }
+}
+
+#[test]
+fn mistakes_in_arguments_of_compare_are_refused() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("published.json").display().to_string();
+    // Published rows, further arguments, expected status and part of the message.
+    let cases: [(&str, &[&str], i32, &str); 6] = [
+        (r#"[{"time":"5"}]"#, &[], 3, r#"entry 1: `time` is "5", but should be a number, or null"#),
+        (r#"[{"time":null},{"goal":true}]"#, &[], 3, "entry 2: `goal` is true, but should be a number"),
+        (r#"[{"name":5}]"#, &[], 3, "entry 1: `name` is 5, but should be a text"),
+        (r#"[{"speed":5}]"#, &[], 3, "`speed` is not a measure"),
+        ("[]", &["--pairs", "0"], 2, "--pairs"),
+        ("[]", &["--state-limit", "2"], 12, "missions/camara_like.toml: error[Q505]"),
+    ];
+    for (published, extra_arguments, status, expected) in cases {
+        std::fs::write(&file, published).expect("written");
+        let arguments = ["compare", "missions/camara_like.toml", "--published", &file];
+        let outcome = metaplan(&[&arguments[..], extra_arguments].concat());
+        assert_eq!(outcome.status, status, "{published} {extra_arguments:?}: {outcome:#?}");
+        let output = format!("{}{}", outcome.stderr, headlines(&outcome.stderr));
+        assert!(output.contains(expected), "{expected}: {outcome:#?}");
     }
 }
 

@@ -70,7 +70,8 @@ pub enum Kind {
 }
 
 impl Kind {
-    fn of(text: &str) -> Option<Self> {
+    /// Returns the kind of a text. Returns `None` if the text begins like none of these kinds.
+    pub fn of(text: &str) -> Option<Self> {
         let mut lines = text.lines().map(str::trim_start);
         let first = lines.find(|line| !line.is_empty() && !line.starts_with([';', '#']))?;
         let content = &text[text.find(first).unwrap_or(0)..];
