@@ -173,8 +173,8 @@ impl Reporter {
     }
 }
 
-/// Reports a component as failed while the last message is older than `period`. Messages themselves are
-/// reported by the subscription.
+/// Reports a component as failed while no message has arrived for `period`, before the first message
+/// for at least the discovery time. Messages themselves are reported by the subscription.
 fn watch_silence(
     clock: Arc<Clock>,
     started: Duration,
