@@ -252,8 +252,8 @@ fn watch_presence(node: &Arc<Node>, name: &str, reporter: Reporter) -> Task<()> 
     })
 }
 
-/// Reports whether a lifecycle node has a state: after each transition, and when its service appears or
-/// disappears.
+/// Reports whether a lifecycle node has a state: at the start and the end of each transition, and when
+/// its service appears or disappears.
 fn watch_state(
     node: &Arc<Node>,
     name: &str,
