@@ -21,7 +21,7 @@ pub struct Diagnostic {
     pub code: &'static str,
     /// Position of the error.
     pub place: Place,
-    /// Description of the error and of the remedy.
+    /// Description of the error.
     pub message: String,
 }
 

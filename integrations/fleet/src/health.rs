@@ -15,8 +15,8 @@ pub struct Health(Mutex<State>);
 struct State {
     /// Start of the last round of the main loop; `None` before the first one.
     round: Option<Instant>,
-    /// Time of the last response of the log to the worker, and the duration for which the log then counts as
-    /// reachable.
+    /// Time at which the log last acknowledged the worker's status, and the duration for which the log then
+    /// counts as reachable.
     contact: Option<(Instant, Duration)>,
     is_draining: bool,
 }

@@ -169,8 +169,8 @@ impl Robot {
     /// loop handle the event.
     ///
     /// # Errors
-    /// The event is refused, and the state is unchanged. Or the robot cannot continue: its mission is missing, or its
-    /// snapshot does not fit the mission.
+    /// The event is refused, and the state is unchanged. Or the robot cannot continue: its mission is missing, its
+    /// snapshot does not fit the mission, or its last decision cannot be parsed.
     pub fn decide(&mut self, event: &Stored, missions: &Missions) -> Result<Decided, Undecided> {
         match self.begin(event, missions)? {
             Begun::Decided(decided) => Ok(decided),
@@ -260,8 +260,9 @@ impl Robot {
         self.complete(search)
     }
 
-    /// Returns the decision that completes the last ones with these plans. Returns `None` if planning is not pending, or
-    /// the plans cannot be used. Plans for an outdated problem can be used only if `is_late` is `true`.
+    /// Returns the decision that completes the last ones with these plans. Returns `None` if the loop is not loaded,
+    /// planning is not pending, or the plans cannot be used. Plans for an outdated problem can be used only if
+    /// `is_late` is `true`.
     pub fn plan(&mut self, thoughts: Thoughts, is_late: bool) -> Option<Decided> {
         let Control::Loaded(control, _) = &mut self.control else { return None };
         let late = !control.is_answered_by(&thoughts);

@@ -1,10 +1,11 @@
 //! Native part of the Python package. It returns answers of the facade as JSON and text, from which
 //! `metaplan/*.py` creates objects.
 //!
-//! This crate makes no decisions. The interpreter lock is released during work. While planning,
-//! explaining and verifying, signals are checked every 20 ms, and Ctrl-C sets the interrupt flag of
-//! the work. Python handles signals in its main thread only, so work in another thread is not interrupted.
-//! Other functions (such as `reason`, `check`, `compare` and the loop) handle signals only at their end.
+//! The interpreter lock is released during work, except in `pddl` and in changes of a mission's situation.
+//! While planning, explaining and verifying, signals are checked every 20 ms, and Ctrl-C sets the
+//! interrupt flag of the work. Python handles signals in its main thread only, so work in another thread
+//! is not interrupted. Other functions (such as `reason`, `check`, `compare` and the loop) handle signals
+//! only at their end.
 
 mod ask;
 mod failure;

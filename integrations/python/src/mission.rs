@@ -46,7 +46,7 @@ pub(crate) struct Planned {
     /// The plan with one step per line. `None` without a plan, or for a Pareto front.
     #[pyo3(get)]
     text: Option<String>,
-    /// The status and its proof in a sentence.
+    /// The status and its proof in a sentence. For a Pareto front, only the status.
     #[pyo3(get)]
     verdict: String,
     /// Warnings as JSON.
@@ -100,7 +100,7 @@ struct Drawable {
 
 #[pymethods]
 impl Planned {
-    /// Returns the plan as a timeline in SVG. `None` without a plan.
+    /// Returns the plan as a timeline in SVG. `None` without a plan, and for a Pareto front.
     fn svg(&self) -> Option<String> {
         let Drawable { setup, problem, solution } = self.seen.as_ref()?;
         let seen = Seen { mission: &setup.mission, problem, positions: &Positions::Unknown };

@@ -1,6 +1,6 @@
-//! Converts diagnostics to input lines of the adaptation loop. There are three sources: on `/diagnostics`, the statuses
-//! of the monitors of MROS, ROSA and PLANTA; also on `/diagnostics`, diagnostics of drivers, which the rules of
-//! `ros.toml` translate; and signals.
+//! Converts diagnostics to input lines of the adaptation loop. There are three sources: statuses on `/diagnostics` of
+//! the monitors of MROS, ROSA and PLANTA; statuses on `/diagnostics` of drivers, which the rules of `ros.toml`
+//! translate; and signals (`[[signals]]` of `ros.toml`), i.e. states and presence of nodes, fields and rates of topics.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;

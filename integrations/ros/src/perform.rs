@@ -65,7 +65,8 @@ pub struct Call {
     pub arguments: Vec<String>,
     /// Design to be used for each function that the action requires.
     pub configuration: BTreeMap<String, String>,
-    /// Planned duration in seconds; 0 if the domain has no durations.
+    /// Planned duration in seconds; 0 if the domain has no durations, or for an action of
+    /// PlanSys2's executor.
     pub duration: f64,
 }
 

@@ -4,7 +4,8 @@
 //! Designs are selected by [`metaplan::configure`], as in MROS, and requested by `/mros/request_configuration`. If
 //! only `/<function>/change_mode` has a server, that service is used. Steps in the settings replace both services.
 //! The status of an objective is published when the goal is accepted, when its function has a new design, and every
-//! `reasoning_period`. A cancelled goal ends once its function has its unground mode, or at once without such a mode.
+//! `reasoning_period`. A cancelled goal ends once its function has its unground mode. Without such a mode, or if
+//! another goal needs the function, it ends at once.
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 

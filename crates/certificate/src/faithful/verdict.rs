@@ -34,7 +34,7 @@ pub enum Difference {
         /// Description of the error.
         reason: String,
     },
-    /// The initial states differ.
+    /// The initial states differ, or the direction or the initial value of the metric does.
     #[error("{what} differs in the initial state")]
     Initial {
         /// Description of the variable, number, or metric.
@@ -77,8 +77,8 @@ pub enum Difference {
         /// The derived atom.
         atom: String,
     },
-    /// The witness does not contain the initial state, or an action instance leads out of the
-    /// witness.
+    /// The witness does not contain the initial state, or an action instance or an event leads out
+    /// of the witness.
     #[error("the witness does not cover all values of {what} that it may reach")]
     Witness {
         /// The atom or number that is outside the witness.

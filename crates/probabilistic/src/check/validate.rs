@@ -11,7 +11,8 @@ struct Validation {
     problems: Vec<Diagnostic>,
 }
 
-/// Checks the names (except those of reward structures) and types in a property. Returns all errors.
+/// Checks the names (except those of reward structures) and types in a property. Returns the first
+/// error of each expression.
 pub fn validate<N: Number>(program: &Program<N>, property: &Property) -> Result<(), Error> {
     let mut validation = Validation { names: program.names.clone(), problems: Vec::new() };
     validation.property(property);

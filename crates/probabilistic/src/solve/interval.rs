@@ -23,7 +23,7 @@ use crate::solve::users::{Users, owners};
 pub struct Enclosed<N> {
     pub policy: Vec<u32>,
     pub values: Vec<N>,
-    /// Upper bound on the absolute error of each value; empty in exact arithmetic.
+    /// Upper bound on the absolute error of each value; empty in exact arithmetic and for a draft.
     pub errors: Vec<f64>,
 }
 

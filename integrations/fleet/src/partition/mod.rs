@@ -51,8 +51,8 @@ pub struct Settings {
     pub discard_within: Duration,
     /// Time between two checks whether events have to be discarded.
     pub look: Duration,
-    /// Maximum time that a partition waits for running loops when it is given back. Their events are decided by
-    /// the next owner.
+    /// Maximum time that a partition waits for running loops when it is given back. The next owner decides the
+    /// events of loops that run longer.
     pub drain: Duration,
 }
 
@@ -145,8 +145,8 @@ impl<S: Store> Shared<S> {
     }
 }
 
-/// Runs a partition until `drain` becomes true or its sender is dropped. If it becomes true, finishes running decisions
-/// and discards handled events.
+/// Runs a partition until `drain` becomes true, its sender is dropped, or work on the partition panics. If `drain`
+/// becomes true, finishes running decisions and discards handled events.
 pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, drain: watch::Receiver<bool>) {
     let mut dropped = drain.clone();
     tokio::select! {

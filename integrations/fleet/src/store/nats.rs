@@ -49,7 +49,8 @@ pub struct Access {
     pub tls_cert: Vec<PathBuf>,
 }
 
-/// Parameters with which a missing fleet is created. An existing fleet keeps its own.
+/// Name of the fleet, and the parameters with which it is created if it is missing. An existing
+/// fleet keeps its own parameters.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Layout {
     /// Set the name of the fleet. Its streams, buckets and subjects begin with this name, except for subjects of the fleet `fleet`.
@@ -64,7 +65,8 @@ pub struct Layout {
     /// Keep this number of decisions of each robot, if the fleet is created.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(i64).range(1..))]
     pub history: i64,
-    /// Set the time in seconds after which a silent worker loses its partitions if the fleet is created.
+    /// Set the lease time if the fleet is created: the seconds after which a worker that publishes no
+    /// status loses its partitions.
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(2..=3600))]
     pub lease: u64,
 }

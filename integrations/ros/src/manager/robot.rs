@@ -39,7 +39,7 @@ const OBSERVATION_DELAY: Duration = Duration::from_millis(500);
 /// before the server has discovered this node.
 const MAX_MODE_REQUESTS: u32 = 3;
 
-/// Minimum time between two reports of the same progress.
+/// Minimum time after a report of progress until feedback without a share repeats this report.
 const REPEAT_PERIOD: Duration = Duration::from_secs(1);
 
 #[derive(Clone)]

@@ -18,11 +18,11 @@ use crate::node::{Node, Publisher, Severity, depth, is_lyrical, now};
 /// Primary state of a managed node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// The node has not read its files, such as the mission.
+    /// The node is not configured and does not perform its role.
     Unconfigured,
-    /// The node has read its files and is idle.
+    /// The node is configured. The planner performs its role in this state too.
     Inactive,
-    /// The node has read its files and performs its role.
+    /// The node is configured and performs its role.
     Active,
     /// The node is shutting down.
     Finalized,

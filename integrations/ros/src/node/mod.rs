@@ -2,9 +2,9 @@
 //! installation.
 //!
 //! Names are expanded and remapped as in ROS 2. Received messages are passed to closures, which must return quickly, on
-//! a thread of the executor. Samples of the wrong type and endpoints with another type are reported and ignored. Our
-//! own services wait until a participant reveals its mapping of services, at most for one second after the first
-//! discovery (see `rmw`).
+//! a thread of the executor. Samples of the wrong type and endpoints with another type are reported and ignored.
+//! Without a selected mapping, our own services wait until a participant reveals its mapping, at most for one second
+//! after the first discovery (see `rmw`).
 
 mod action;
 mod any_topic;

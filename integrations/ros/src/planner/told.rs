@@ -1,5 +1,5 @@
-//! Publication of planning results: plans and reasons for their absence in the log, and plans as JSON on the topic
-//! `~/plan`. The JSON contains the designs, for which PlanSys2's plans have no field.
+//! Publication of planning results: the cost of a plan or the reason for its absence in the log, and the best plan
+//! as JSON on the topic `~/plan`. The JSON contains the designs, for which PlanSys2's plans have no field.
 
 use std::sync::Arc;
 

@@ -63,7 +63,7 @@ type LastMessage = Arc<Mutex<Option<(SystemTime, Vec<u8>)>>>;
 
 struct Observed {
     last: LastMessage,
-    /// Exists if a step publishes on the topic.
+    /// Exists if a step or an undo publishes on the topic.
     publisher: Option<Publisher<Raw>>,
 }
 

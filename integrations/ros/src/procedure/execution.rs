@@ -42,7 +42,8 @@ struct FunctionProcedures {
     modes: BTreeMap<String, Procedure>,
     /// Held while a procedure runs, so that procedures of a function never overlap.
     running: smol::lock::Mutex<()>,
-    /// Mode that was put into effect or seen last.
+    /// Mode that was put into effect or seen last. `None` once an observation finds the conditions
+    /// of no mode.
     present: Mutex<Option<String>>,
     /// Modes that could not be put into effect because a node was silent.
     silent: Mutex<BTreeSet<String>>,

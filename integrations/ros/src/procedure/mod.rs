@@ -9,8 +9,8 @@
 //! verify = [{ topic = "/amcl_pose" }]
 //! ```
 //!
-//! The design is in effect when all steps have succeeded and all conditions hold. If one fails, the steps before it
-//! are undone in reverse order.
+//! The design is in effect when all steps have succeeded and all conditions hold. If one fails, the executed steps
+//! are undone in reverse order, as far as possible.
 
 mod clients;
 mod execution;

@@ -30,8 +30,9 @@ pub(crate) struct Procedure {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Step {
     pub(crate) operation: Operation,
-    /// Operation that is executed if a later step or a condition fails, or if the step gets no answer. State
-    /// transitions and parameters need none, and a message needs one only if there was no earlier message.
+    /// Operation that undoes the step if the procedure fails or is replaced after the step may have had an
+    /// effect. State transitions and parameters need none, and a message needs one only if there was no
+    /// earlier message.
     pub(crate) undo: Option<Operation>,
 }
 

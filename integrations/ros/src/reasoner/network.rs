@@ -265,7 +265,7 @@ impl Network {
         self.calling.insert(name, call);
     }
 
-    /// Executes the steps of a mode. Running steps of the function are undone first.
+    /// Executes the steps of a mode. Running steps of the function are normally undone first.
     fn execute(&mut self, wanted: Wanted) {
         let is_replaced = Arc::new(AtomicBool::new(false));
         if let Some(earlier) = self.replaced.insert(wanted.function.clone(), Arc::clone(&is_replaced)) {

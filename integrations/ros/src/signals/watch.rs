@@ -173,8 +173,8 @@ impl Reporter {
     }
 }
 
-/// Reports a component as failed while the last message is older than `period`. Messages themselves are
-/// reported by the subscription.
+/// Reports a component as failed while no message has arrived for `period`, before the first message
+/// for at least the discovery time. Messages themselves are reported by the subscription.
 fn watch_silence(
     clock: Arc<Clock>,
     started: Duration,
@@ -252,8 +252,8 @@ fn watch_presence(node: &Arc<Node>, name: &str, reporter: Reporter) -> Task<()> 
     })
 }
 
-/// Reports whether a lifecycle node has a state: after each transition, and when its service appears or
-/// disappears.
+/// Reports whether a lifecycle node has a state: at the start and the end of each transition, and when
+/// its service appears or disappears.
 fn watch_state(
     node: &Arc<Node>,
     name: &str,

@@ -36,7 +36,8 @@ impl Structure {
     }
 }
 
-/// Converts the text of a default value or a constant of a definition. Returns `None` if it is no value of the type.
+/// Converts the text of a default value or a constant of a definition. Returns `None` if the text does not have the
+/// form of the type. Ranges of integers and lengths are checked only when the value is written.
 pub(super) fn parse_value(text: &str, layout: &Layout) -> Option<Value> {
     let text = text.trim();
     match layout {

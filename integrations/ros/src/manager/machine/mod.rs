@@ -43,9 +43,11 @@ struct Action {
 struct CallFailures {
     /// Failed designs, with the time of the next attempt. `None` if the attempt waits until the function replies.
     designs: BTreeMap<String, Option<Duration>>,
-    /// Number of consecutive calls without a reply.
+    /// Number of mode changes that failed without a reply (after all attempts) since the last
+    /// successful change. It determines the delay of probes.
     missed_replies: u32,
-    /// `true` from the first probe until the function replies. Another timeout then needs no further probe.
+    /// `true` from the first probe until the function replies to a probe. Another timeout then needs no
+    /// further probe.
     is_probed: bool,
 }
 

@@ -16,8 +16,8 @@ const DIAGNOSTICS_WAIT: Duration = Duration::from_secs(3);
 
 impl Machine {
     /// Handles the start: `modes` are the current modes of the robot's functions. After a restart, the
-    /// answers of the adaptation loop are deferred until diagnostics arrive or a task is requested, at most
-    /// for [`DIAGNOSTICS_WAIT`].
+    /// answers of the adaptation loop are deferred until diagnostics arrive or a task is requested or
+    /// cancelled, at most for [`DIAGNOSTICS_WAIT`].
     pub(super) fn ready(&mut self, modes: Vec<(String, Option<String>)>) -> Result<String, Message> {
         self.state = State::Idle;
         let is_first = self.control.beliefs().lines() == 0;
