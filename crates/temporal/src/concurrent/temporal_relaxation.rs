@@ -43,7 +43,7 @@ pub(super) struct TemporalRelaxation {
     pub(super) free: Vec<u32>,
     pub(super) adds: Lists,
     /// Numeric conditions whose linear expressions each rule may increase, with the amounts. An amount is `None`
-    /// if it depends on the state.
+    /// if it depends on the state or overflows.
     pub(super) raises: Vec<Box<[NumericEffect]>>,
     pub(super) weights: Vec<u32>,
     /// Operator from which each rule was made; `None` for the rules of clauses and derived facts.
