@@ -277,8 +277,8 @@ impl<'a> RelaxationBuilder<'a> {
         Some(index)
     }
 
-    /// Adds a conjunction for each pair of facts selected by [`add_conjunctions`], and rewrites
-    /// `goal` to use these conjunctions.
+    /// Adds a conjunction for each pair of facts selected by [`add_conjunctions`], and rewrites the
+    /// rules and `goal` to use these conjunctions.
     fn conjoin<T: TimeNumber>(
         &mut self,
         concurrent: &TemporalTask<T>,
