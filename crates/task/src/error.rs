@@ -20,7 +20,7 @@ pub enum File {
 pub struct Place {
     /// The file or the objective.
     pub file: File,
-    /// Text range in it.
+    /// Text range in the file or objective.
     pub span: Span,
 }
 

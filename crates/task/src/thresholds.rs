@@ -28,8 +28,8 @@ pub struct Thresholds {
     pub front: usize,
     /// Number of labels after which the graph of all optimal plans is first searched for alternative plans.
     pub alternatives: usize,
-    /// Number of nodes after which the greedy search and the search for sequential plans alternate with the
-    /// exact temporal search.
+    /// Work of the exact temporal search, about the number of its expanded and generated nodes, after which
+    /// incomplete searches alternate with it.
     pub concurrent: usize,
     /// Maximum number of bits of the temporal unit (common denominator of all times) with which times are 128-bit
     /// integers. With a larger unit, or if 128 bits do not suffice, times are wider integers. The maximum does not

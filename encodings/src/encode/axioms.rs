@@ -4,8 +4,9 @@
 //! - completion: `h@t ↔ ⋁ b@t` over the bodies b of the rules with head h \[1\];
 //! - levels: variables that depend on each other are derived in rounds. A true `h@t` needs a supporting rule, whose
 //!   body variables from the same layer are derived in earlier rounds. With a variable `s@t` for each rule that may
-//!   support h: `h@t → ⋁ s@t`, `s@t → b@t`, and `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` for each such body variable a and each
-//!   number k. Here r is the round in which a variable is derived, in order encoding \[2\].
+//!   support h (`b@t` itself if the body has no such variables): `h@t → ⋁ s@t`, `s@t → b@t`, and
+//!   `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` for each such body variable a and each number k. Here r is the round in which a
+//!   variable is derived, in order encoding \[2\].
 //!
 //! \[1\] K. Clark: Negation as failure, Logic and Data Bases, 1978.
 //! \[2\] T. Janhunen: Representing normal programs with clauses, ECAI 2004.

@@ -6,7 +6,7 @@
 //! operators per step. Unused steps are idle and come at the end. The designs of an operator's
 //! slots (its parameters for function designs) have variables separate from the operator's
 //! variable. The formula therefore grows with the sum of the numbers of designs, not with their product.
-//! Each family of clauses has a file.
+//! The families of clauses are divided among the files.
 //!
 //! The heads of these files state the clauses symbolically. `o@t` means that operator o is executed at step
 //! t; `v=d@t` that variable v has the value d in the state before step t, so the effects of step t are true

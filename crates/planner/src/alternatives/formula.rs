@@ -111,8 +111,8 @@ impl Run<'_> {
         (answer, is_plan.then_some(steps))
     }
 
-    /// Returns the choices of the first plan that all cheapest plans share, or `None` at a limit.
-    /// The plans in `known` reduce the candidates before the first query.
+    /// Returns the choices of the first plan that all cheapest plans share. Returns `None` if a query has no
+    /// result, for example at a limit. The plans in `known` reduce the candidates before the first query.
     fn forced(&mut self, first: &[GroundStep], known: &[Vec<GroundStep>]) -> Option<Vec<Choice>> {
         let mut choices = Choice::all(first);
         for plan in known {

@@ -173,7 +173,8 @@ pub(super) fn raise(
     }
 }
 
-/// Returns the core of the last solver call, reduced by further calls. Returns `None` if a limit is reached.
+/// Returns the core of the last solver call, reduced by further calls. Returns `None` if such a call does not
+/// report unsatisfiability, for example at a limit.
 fn trimmed(run: &mut Run<'_>, live: &mut IncrementalSolver, encoding: &Encoding<'_>) -> Option<Vec<Lit>> {
     let mut core = live.solver.core().to_vec();
     for _ in 0..CORE_TRIM_ROUNDS {

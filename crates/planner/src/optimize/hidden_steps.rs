@@ -1,5 +1,5 @@
-//! Hidden steps: evaluations of preferences at the end of a plan. Searches and formulas count them as steps; horizons and
-//! solutions do not.
+//! Hidden steps: evaluations of preferences at the end of a plan. Searches, formulas and ground plans contain these
+//! steps. Configured horizons, and the horizons and step bounds of solutions, do not count them.
 
 use task::compile::is_satisfaction;
 use task::plan::solution::{Proof, Solution};

@@ -159,7 +159,7 @@ impl<'a> Run<'a> {
         let allowed = if window.steps.is_some() {
             window.allowed
         } else {
-            // Without a step bound, a longer formula can find plans but prove nothing.
+            // Without a step bound, a longer formula can find plans, but not prove optimality.
             let longer = self
                 .config
                 .horizon

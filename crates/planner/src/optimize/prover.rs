@@ -2,7 +2,7 @@
 //! lower bound and the cost of the best plan. The limit rises from stage to stage.
 //!
 //! Such a proof requires a step bound. Without a step bound, there is a single formula for all cheaper plans within a
-//! number of steps. This formula can yield better plans, but proves nothing.
+//! number of steps. This formula can yield better plans, but no proof of optimality.
 
 use std::time::Instant;
 
@@ -33,7 +33,7 @@ pub(super) struct Prover {
 pub(super) enum ProverOutcome {
     Proved(Proof),
     Paused,
-    /// A limit was reached, formulas become too large, or further formulas would prove nothing.
+    /// A limit was reached, formulas become too large, or further formulas cannot prove optimality.
     Over,
 }
 

@@ -377,7 +377,7 @@ pub(super) mod tests {
         best
     }
 
-    /// Returns the number of pruned operators, or `None` if stubborn sets do not apply to the task.
+    /// Returns the number of pruned operators, or `None` if the task is unsuitable for this test.
     /// Checks that the first operator of a cheapest plan with the fewest steps is not pruned.
     fn check(text: &(String, String)) -> Option<usize> {
         let task = ground_text(text.clone());

@@ -6,8 +6,8 @@ use pddl::ast::{ActionBody, Condition, Domain, Effect, Problem};
 use super::simplify::{all, flag, holds, not};
 use super::syntax_edits::{declare, hidden};
 
-/// A deadline from `always-within`: after each state in which the first condition holds, the second condition
-/// must hold within a given time.
+/// A deadline from `always-within`: in each state in which the first condition holds, or within a given time after
+/// it, the second condition must hold.
 #[derive(Debug, Clone)]
 pub struct Deadline {
     /// Maximum time from a state with the first condition until the second condition holds.
@@ -30,7 +30,8 @@ impl Deadline {
     }
 }
 
-/// Atom that the auxiliary actions add. It is never true, because these actions are never executed.
+/// Atom that the auxiliary actions add. It is never true in a state of a plan, because plans do not contain these
+/// actions.
 pub(super) const LOOKED_AT: &str = "a deadline was looked at";
 
 pub(super) fn install(

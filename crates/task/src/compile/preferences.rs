@@ -28,7 +28,8 @@ const GOING_ON: &str = "the plan goes on";
 pub(super) const VIOLATION: &str = " is violated";
 pub(super) const SATISFACTION: &str = " is met";
 
-/// Atom that hidden actions add if actions may overlap. It is never true, because these actions are never executed.
+/// Atom that hidden actions add if actions may overlap. It is never true in a state of a plan, because plans do not
+/// contain these actions.
 const VIOLATED: &str = "a preference is violated";
 
 /// Beginning of the names of the functions that count violations. It contains a space, so no other function has it.

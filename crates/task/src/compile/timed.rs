@@ -124,8 +124,8 @@ impl Monitors<'_> {
             Addition::notes(begins, Effect::Add(flag(&begun)))
         })?;
         let (noted, last) = if hard {
-            // The auxiliary action for the second condition is never executed. The search evaluates its effect
-            // to detect a pending deadline.
+            // Grounding drops atoms that nothing reads. The effect of the auxiliary action for the second
+            // condition reads `begun`, so this atom is kept.
             (Effect::When(holds(&begun), Box::new(Effect::Add(flag(LOOKED_AT)))), truth())
         } else {
             let satisfied = self.remember("is kept", false);

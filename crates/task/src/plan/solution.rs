@@ -137,7 +137,7 @@ pub struct Statistics {
     pub generated: u64,
     /// Number of states for which a heuristic was evaluated.
     pub evaluated: u64,
-    /// Number of restarts of the satisficing search.
+    /// Number of restarts of incomplete searches.
     pub restarts: usize,
     /// Better plans and considerably higher lower bounds in chronological order.
     pub history: Vec<Moment>,

@@ -1,7 +1,7 @@
 //! Lower bounds on the times of operators, caused by timed initial literals.
 
-/// Lower bounds on the start and the end of an operator. In addition, it starts no earlier than the previous
-/// action ends.
+/// Lower bounds on the start and the end of an operator. In addition, the operator starts no earlier than the
+/// previous action ends.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Timing<N> {
     pub(crate) start: Option<N>,

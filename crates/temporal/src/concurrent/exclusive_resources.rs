@@ -166,7 +166,7 @@ fn value_in(facts: &[Fact], variable: VariableId) -> Option<u32> {
 }
 
 /// Returns a variable as a resource; `setters` are the operators that set the variable. Returns `None` if no
-/// set of busy values satisfies the definition.
+/// set of busy values that satisfies the definition is found.
 fn resource<T: TimeNumber>(
     concurrent: &TemporalTask<T>,
     variable: VariableId,

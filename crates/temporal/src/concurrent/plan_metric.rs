@@ -33,7 +33,8 @@ impl<T: TimeNumber> TemporalTask<T> {
         self.violated(state).try_fold(0, |sum: Int, id| sum.checked_add(penalty(id)))
     }
 
-    /// Final state of a sequence, after the operators that mark soft deadlines as met.
+    /// Final state of a sequence that is followed by an auxiliary operator for each deadline that it
+    /// meets. These operators mark soft deadlines as met.
     ///
     /// # Errors
     /// Fails if a hard deadline is missed.

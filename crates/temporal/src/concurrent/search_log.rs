@@ -17,7 +17,8 @@ pub(super) struct Record<'r, T: TimeNumber = Int> {
     concurrent: &'r TemporalTask<T>,
     report: &'r mut dyn FnMut(Improvement),
     started: Instant,
-    /// Cost of the incumbent and lower bound at the last entry of the history, as integer metrics.
+    /// Metric of the incumbent and lower bound at the last entry of the history, in the scale of
+    /// `Measure`.
     noted: Option<(Option<Rational>, Rational)>,
     cost: Option<Rational>,
     /// Initial lower bound if the search is incomplete; later lower bounds are capped at this
@@ -41,8 +42,8 @@ impl<'r, T: TimeNumber> Record<'r, T> {
         self.report_lower_bound(root);
     }
 
-    /// Records a better plan with the integer metric `value` and `horizon` happenings (actions, if
-    /// durations are chosen), found by `part`, and a lower bound.
+    /// Records a better plan with the metric `value` (in the scale of `Measure`) and `horizon`
+    /// happenings (actions, if durations are chosen), found by `part`, and a lower bound.
     pub(super) fn improve(&mut self, value: &Rational, horizon: usize, lower: Rational, part: PlannerPart) {
         self.statistics.found_by = Some(part);
         self.cost = Some(value.clone());

@@ -316,7 +316,7 @@ impl<T: TimeNumber> Index<'_, T> {
         })
     }
 
-    /// Returns `true` if nothing but the starts and ends of `own` certainly reads or sets the variable
+    /// Returns `true` if it is certain that only the starts and ends of `own` read or set the variable
     /// during a run.
     fn is_hidden(
         &self,

@@ -43,7 +43,7 @@ pub(super) struct TemporalRelaxation {
     pub(super) free: Vec<u32>,
     pub(super) adds: Lists,
     /// Numeric conditions whose linear expressions each rule may increase, with the amounts. An amount is `None`
-    /// if it depends on the state.
+    /// if it depends on the state or overflows.
     pub(super) raises: Vec<Box<[NumericEffect]>>,
     pub(super) weights: Vec<u32>,
     /// Operator from which each rule was made; `None` for the rules of clauses and derived facts.
@@ -277,8 +277,8 @@ impl<'a> RelaxationBuilder<'a> {
         Some(index)
     }
 
-    /// Adds a conjunction for each pair of facts selected by [`add_conjunctions`], and rewrites
-    /// `goal` to use these conjunctions.
+    /// Adds a conjunction for each pair of facts selected by [`add_conjunctions`], and rewrites the
+    /// rules and `goal` to use these conjunctions.
     fn conjoin<T: TimeNumber>(
         &mut self,
         concurrent: &TemporalTask<T>,

@@ -27,9 +27,9 @@ pub(super) struct TimelineWindow<'t> {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Start {
-    /// At the end of the previous action, possibly at the time of an event.
+    /// At the end of the previous action or wait, possibly at the time of an event.
     Free,
-    /// At the end of the previous action, but later than the event that begins the phase.
+    /// At the end of the previous action or wait, but later than the event that begins the phase.
     Later,
     /// A moment (a very short time) after the event that begins the phase.
     AfterEvent,

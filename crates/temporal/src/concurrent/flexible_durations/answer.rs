@@ -85,7 +85,7 @@ fn is_decimal(concurrent: &TemporalTask, time: &Rational) -> bool {
 /// Rounds the durations to decimals one after another. Each duration becomes the neighbouring
 /// multiple of [`grain`] that is feasible and gives the better metric; a duration that is already a
 /// decimal is kept. Earlier roundings are not revised. Returns `None` if neither neighbour of some
-/// duration is feasible.
+/// duration is feasible or the granularity overflows.
 fn rounded(
     concurrent: &TemporalTask,
     program: &Program,

@@ -152,7 +152,7 @@ impl Course {
 
     /// Returns the partial plan after a happening. `run` identifies the run if the happening is an
     /// end. Returns `None` if the happening is not applicable, if no times and durations satisfy the
-    /// constraints, or if the cost overflows.
+    /// constraints, or if a number or the cost overflows.
     pub(super) fn after(
         &self,
         concurrent: &TemporalTask,
