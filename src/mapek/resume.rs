@@ -443,8 +443,9 @@ impl<'a> Shortening<'a> {
         }
     }
 
-    /// Returns the duration of the whole action, which replaces `?duration` in effects. This is the expression of its
-    /// constraint, unless its value may change during the action.
+    /// Returns the duration of the whole action, which replaces `?duration` in effects: the expression of its equality
+    /// constraint, if there is one and the action does not change its value. Otherwise, the duration of the remainder
+    /// divided by its share.
     fn whole_duration(&self, stated: Option<Expression>, changed: &BTreeSet<Name>) -> Expression {
         let is_constant = |expression: &Expression| {
             let mut is_constant = true;
