@@ -183,8 +183,8 @@ fn repairs(
     let without = |alteration: &Alteration| {
         available_changes.iter().copied().filter(|other| *other != alteration).collect::<Vec<_>>()
     };
-    // An alteration that no others can replace is in every set. If there are several alterations of a value, without
-    // the last one another one has an effect, which may be harmful.
+    // An alteration that no others can replace is in every set. If a value has several alterations, the last one
+    // applied prevails. Without it, another one prevails, which may be harmful; so such alterations are not tested.
     let is_only = |alteration: &Alteration| {
         available_changes.iter().filter(|other| other.name == alteration.name).count() == 1
     };
