@@ -53,7 +53,7 @@ pub(crate) struct Remainder<'a> {
     pub step: &'a PlannedStep,
     /// Completed share of the action, from 0 to 1.
     pub progress: &'a BigRational,
-    /// Changes of values by the progress, by the text of the function without parentheses.
+    /// Changes of values by the progress. The keys are the texts of the functions without parentheses.
     pub applied: &'a BTreeMap<String, BigRational>,
     /// Whether the action is known to have started.
     pub has_started: bool,
