@@ -19,7 +19,7 @@ pub struct ConfigureAnswer<'a> {
     /// Name and version of this format.
     #[schemars(extend("const" = CONFIGURE))]
     format: &'static str,
-    /// Whether each function that needs a design has one.
+    /// Whether a design was chosen for each function that needs one.
     served: bool,
     /// Whether it is proved that no choice for these objectives is better.
     optimal: bool,

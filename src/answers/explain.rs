@@ -25,7 +25,8 @@ pub struct ChangesAnswer<'a> {
     best: BestPart<'a>,
     /// The smallest changes that lead to another plan.
     changes: Vec<ChangePart<'a>>,
-    /// Whether all values were examined; if not, a limit was reached.
+    /// Whether all values were examined; if not, a plan was not proved to be the best, for example at
+    /// a limit.
     complete: bool,
     /// Comparisons of measurements in rules that were not examined, in words.
     unexamined: &'a [String],
@@ -64,8 +65,8 @@ pub struct DesignAnswer<'a> {
     /// there are many. Otherwise: single changes, each of which makes it unavailable. The changes
     /// of a set suffice together, and none of them was found to be superfluous.
     repairs: Vec<RepairPart<'a>>,
-    /// Whether each plan of this answer is proved optimal, or proved not to exist; if not, a limit
-    /// was reached or reasoning failed.
+    /// Whether each plan of this answer is proved optimal, or proved not to exist. False, for example,
+    /// if a limit was reached or reasoning failed.
     complete: bool,
     /// Changes of the situation that were not examined, in words.
     unexamined: &'a [String],

@@ -36,7 +36,8 @@ pub struct PlanAnswer {
     #[schemars(with = "Option<f64>")]
     lower_bound: Option<Value>,
     /// Number of steps up to which better plans are excluded; 0 if no such number was determined. For
-    /// an optimal plan, at least its number of steps.
+    /// an optimal plan, at least its number of steps. If `unbounded` is not null, the number of steps
+    /// of the plan.
     horizon: usize,
     /// Proof that the plan is optimal, or that no plan exists; otherwise null. The status
     /// `unsolvable_within_horizon` can have none: the formulas up to `horizon` have no plan.
@@ -148,7 +149,7 @@ struct StepPart {
     /// Contribution to the metric.
     #[schemars(with = "f64")]
     cost: Value,
-    /// Functions whose design differs from that in the last step with the same function.
+    /// Functions whose design differs from that in the latest earlier step with the same function.
     reconfigured: Vec<String>,
 }
 

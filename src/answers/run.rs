@@ -25,7 +25,7 @@ pub struct ReadyLine {
 pub(super) struct RecoveryPart {
     /// Whether the loop was restored from the journal.
     resumed: bool,
-    /// Number of lines in the journal.
+    /// Number of input lines that the journal has recorded.
     lines: u64,
     /// Greatest sequence number of an accepted line, or null if no such line had a number.
     seq: Option<u64>,

@@ -85,8 +85,8 @@ impl Tasked {
     pub fn problem(&self, mission: &Mission, situation: &Valuation) -> Result<Problem, Errors> {
         let mut way = Vec::new();
         let mut place = situation.place;
-        // Predecessor links give the actions in reverse order.
-        // The merged goal place of a mission whose goal holds already is no task state.
+        // Predecessor links give the actions in reverse order. The merged goal place of a mission whose goal holds
+        // already has no link, because it is no task state.
         while let Some(Some((before, act))) = self.origins.get(place) {
             way.push(act);
             place = *before;

@@ -5,9 +5,9 @@
 //! answered by planning again with this design as the only one for its functions, as if it were available. The
 //! metric of this plan minus that of the best plan is the price of the design. "What would change the plan?" is
 //! answered by planning with other values. A measured attribute is set to the values at which a requirement begins
-//! or ceases to hold, or at which the outcome of a comparison with a number in a rule changes. A numeric value of
-//! the problem, such as a battery, is varied by bisection between a value with the current plan and a value with
-//! another plan.
+//! or ceases to hold, or at which the outcome of a comparison with a number in a rule changes. The value of a
+//! numeric function without parameters, such as a battery, is varied in growing steps, then by bisection between a
+//! value with the current plan and a value with another plan.
 
 mod causes;
 mod parts;
@@ -53,8 +53,8 @@ pub struct DesignExplanation {
     /// Each single alteration in [`Availability::ways`], with the best plan after this alteration
     /// alone.
     pub changes: Vec<Change>,
-    /// `true` if each plan of the explanation is proved optimal, or proved not to exist. `false` if a limit was
-    /// reached or reasoning failed.
+    /// `true` if each plan of the explanation is proved optimal, or proved not to exist. `false`, for example,
+    /// if a limit was reached or reasoning failed.
     pub complete: bool,
 }
 

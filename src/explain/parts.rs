@@ -10,8 +10,8 @@ use crate::mapek::PlannedStep;
 pub struct BestPlan {
     /// The metric of the best plan, in its unit. `None` without a plan.
     pub cost: Option<BigRational>,
-    /// `true` if it is proved that no plan is better or, without a cost, that there is no plan. `false` if a limit was
-    /// reached, or if reasoning failed.
+    /// `true` if it is proved that no plan is better or, without a cost, that there is no plan. `false`, for example,
+    /// if a limit was reached or reasoning failed.
     pub proved: bool,
     /// Steps of the plan; empty without a plan.
     pub steps: Vec<PlannedStep>,

@@ -25,7 +25,8 @@ pub struct SmallestChanges {
     pub best: BestPlan,
     /// The changes found, at most one upwards and one downwards for each value.
     pub changes: Vec<Change>,
-    /// `true` if all values were examined; `false` if a limit was reached.
+    /// `true` if all values were examined. Otherwise, a plan was not proved to be the best, for example because a
+    /// limit was reached.
     pub complete: bool,
     /// Comparisons of measurements in rules that were not examined, in words.
     pub unexamined: Vec<String>,
@@ -33,9 +34,9 @@ pub struct SmallestChanges {
 
 /// Searches for the smallest changes of single values that lead to another plan. Each measured attribute is set to
 /// the values, below and above the current one, at which a requirement of a design begins or ceases to hold, or at
-/// which the outcome of a comparison with a number in a rule changes. Each positive numeric value of the problem is
-/// changed downwards and upwards by at most 100 %. At a limit, returns the partial results. `hear` is called with
-/// `the best plan` and then with the name of each value, before the search.
+/// which the outcome of a comparison with a number in a rule changes. Each positive value of a numeric function without
+/// parameters is changed downwards and upwards by at most 100 %. At a limit, returns the partial results. `hear` is
+/// called with `the best plan` and then with the name of each value, before the search.
 ///
 /// # Errors
 /// The mission cannot be planned for.

@@ -247,7 +247,8 @@ mod tests {
         let hub = Arc::new(Hub::default());
         let sender = HubSender::of(Arc::clone(&hub));
         let long = "x".repeat(1 << 20);
-        // The lock blocks the receiving thread. It has then taken this line, and has read the number of dropped lines.
+        // The lock blocks the receiving thread. Once no bytes wait, this thread has taken the first line and has read
+        // the number of dropped lines.
         let guard = hub.lock();
         sender.send_event(0, "first");
         while sender.backlog.bytes.load(Ordering::Acquire) > 0 {

@@ -95,8 +95,7 @@ impl Live {
         self.sender.send_answer(answer);
     }
 
-    /// Publishes the availability of the designs at the start, before the first answer. Never
-    /// blocks.
+    /// Publishes the availability of the designs at the start of the loop. Never blocks.
     pub fn known(&self, designs: Vec<DesignChange>) {
         self.sender.send_designs(designs);
     }

@@ -181,8 +181,8 @@ pub struct Effect {
     pub command: Command,
     /// Whether the effect is a repetition, so that the robot may have received it before.
     pub repeated: bool,
-    /// Numbers of unacknowledged earlier effects that are obsolete once this effect has arrived, at most 64. The robot
-    /// need not carry them out.
+    /// Numbers of earlier effects that are obsolete once this effect has arrived, at most 64. The robot need not carry
+    /// them out.
     pub supersedes: Vec<u64>,
 }
 

@@ -68,7 +68,8 @@ pub(super) struct Running {
     pub(super) step: PlannedStep,
     /// Completed share of the action, from 0 to 1.
     pub(super) progress: BigRational,
-    /// Increases of functions by the present progress (negative for decreases), by the text of the function.
+    /// Increases of functions by the present progress (negative for decreases). The keys are the texts of the
+    /// functions.
     pub(super) applied: BTreeMap<String, BigRational>,
     pub(super) cancelling: bool,
     pub(super) suspended: bool,

@@ -33,7 +33,7 @@ pub enum Event {
     /// A sensor reports the value of a quality attribute, or of a function of the problem.
     #[serde(rename = "measured")]
     Measured {
-        /// Local name or IRI.
+        /// Local name or IRI of the attribute, or name of the function.
         attribute: String,
         /// Value, in the attribute's unit.
         #[serde(serialize_with = "as_number")]
@@ -401,7 +401,7 @@ fn status(text: &str) -> Option<Status> {
 }
 
 /// Returns the measurements and component statuses of a diagnostic array. Malformed values become refusals in the
-/// result. Other statuses, and repetitions of a key within one status, are ignored.
+/// result. Well-formed values of other statuses, and repetitions of a key within one status, are ignored.
 fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>>, Refusal> {
     let Some(statuses) = fields.get("status").and_then(Value::as_array) else {
         return Err(Refusal::new("M304", "`status` of a diagnostic array is a list"));

@@ -1,11 +1,10 @@
-//! Decides whether the action under way continues, is suspended, or is cancelled, if it cannot continue unchanged.
+//! Decides whether the action under way continues, is suspended, or is cancelled, if it may have to be interrupted.
 //!
-//! Cancelling an action loses its progress. Therefore, if the action cannot continue unchanged, the mission is planned
-//! twice: beginning with the remaining part of the action, and as if the action had been cancelled. The action is
-//! cancelled if only the second plan exists, or if the second plan is better by at least the minimum benefit; otherwise
-//! the first plan is adopted if it exists. If neither plan exists, the action is suspended until suitable designs are
-//! available again, unless it can continue with its current designs. Robots that cannot suspend an action report that
-//! it was cancelled.
+//! Cancelling an action loses its progress. Therefore, the mission is planned twice: beginning with the remaining part
+//! of the action, and as if the action had been cancelled. The action is cancelled if only the second plan exists, or
+//! if the second plan is better by at least the minimum benefit; otherwise the first plan is adopted if it exists. If
+//! neither plan exists, the action is suspended until suitable designs are available again, unless it can continue with
+//! its current designs. Robots that cannot suspend an action report that it was cancelled.
 
 use num_rational::BigRational;
 

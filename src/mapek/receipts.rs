@@ -21,8 +21,8 @@ pub(super) struct Received {
     /// Superseded reconfigurations without an answer, after the last acknowledged one: maps the effect number to the
     /// requested design.
     pub(super) superseded: BTreeMap<u64, String>,
-    /// Reconfigurations up to this effect number are uncertain; 0 for none. After a report of an unexpected design,
-    /// it is unknown whether the robot carried out the reconfigurations up to this number before or after the report.
+    /// Reconfigurations up to this effect number are uncertain; 0 for none. It is unknown whether the robot carried
+    /// them out before or after a report of the function's design.
     pub(super) doubted: u64,
     /// Effect number of the last reconfiguration whose arrival was only implied by a report of an action. `None` once
     /// this or a later reconfiguration is acknowledged. Copies of the request may still arrive.

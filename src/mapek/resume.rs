@@ -53,7 +53,7 @@ pub(crate) struct Remainder<'a> {
     pub step: &'a PlannedStep,
     /// Completed share of the action, from 0 to 1.
     pub progress: &'a BigRational,
-    /// Changes of values by the progress, by the text of the function without parentheses.
+    /// Changes of values by the progress. The keys are the texts of the functions without parentheses.
     pub applied: &'a BTreeMap<String, BigRational>,
     /// Whether the action is known to have started.
     pub has_started: bool,
@@ -443,8 +443,9 @@ impl<'a> Shortening<'a> {
         }
     }
 
-    /// Returns the duration of the whole action, which replaces `?duration` in effects. This is the expression of its
-    /// constraint, unless its value may change during the action.
+    /// Returns the duration of the whole action, which replaces `?duration` in effects: the expression of its equality
+    /// constraint, if there is one and the action does not change its value. Otherwise, the duration of the remainder
+    /// divided by its share.
     fn whole_duration(&self, stated: Option<Expression>, changed: &BTreeSet<Name>) -> Expression {
         let is_constant = |expression: &Expression| {
             let mut is_constant = true;

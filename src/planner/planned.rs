@@ -40,12 +40,12 @@ pub struct Planned<'m> {
     pub alternatives: Option<Alternatives>,
     /// If the mission is proved unsolvable: unavailable designs that prevent a plan, or the
     /// information that designs are not the reason. `None` if this is not decided within the
-    /// limits. Always `None` without a knowledge base, for overlapping actions, and for costs that
-    /// are too large for integers.
+    /// limits. Always `None` without a knowledge base, for overlapping actions, and for numbers
+    /// that are too large for integers.
     pub blocking: Option<Blocking>,
     /// If the mission is proved unsolvable: numeric functions that actions need and that have no value. If some
     /// of them are probable mistakes or have no value for any arguments, only these. Always empty for
-    /// overlapping actions, and for costs that are too large for integers.
+    /// overlapping actions, and for numbers that are too large for integers.
     pub missing_values: Vec<MissingValue>,
     /// Messages about numbers that are too large for integers. If there are any, planning used only
     /// search in exact rationals.

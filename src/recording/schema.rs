@@ -97,7 +97,7 @@ pub(super) fn answer() -> Value {
             "optimal": {"type": "boolean"},
             "steps": {"type": "array", "items": step},
             "status": {"type": "string"},
-            "effect": {"type": ["integer", "null"], "description": "number of an effect; null if an action is overdue"},
+            "effect": {"type": ["integer", "null"], "description": "number of an effect; null if an acknowledged action is overdue"},
             "action": {"type": "integer", "description": "number of the action to which an effect belongs"},
             "name": {"type": "string", "description": "name of a requested action"},
             "arguments": texts,

@@ -29,7 +29,7 @@ struct Job {
     step: PlannedStep,
     /// Completed share of the action, from 0 to 1.
     progress: f64,
-    /// Changes of values by the progress, by the text of the function.
+    /// Changes of values by the progress. The keys are the texts of the functions.
     applied: BTreeMap<String, BigRational>,
     /// Duration for which the action has stalled without interruption.
     waited: f64,

@@ -1,4 +1,5 @@
-//! Result files of a parameter study, in JSON Lines format: one file per shard, one line per run.
+//! Result files of a parameter study, in JSON Lines format: one file per shard, with a header and one line per
+//! finished run.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};

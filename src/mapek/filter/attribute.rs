@@ -231,8 +231,8 @@ impl AttributeFilter {
         is_agreed.then(|| crossing.since.saturating_add(self.debounce))
     }
 
-    /// Returns the value to be believed if the crossing of a bound is confirmed at `now`: the latest sample that has
-    /// crossed all confirmed bounds and no others.
+    /// Returns the value to be believed if the crossing of a bound is confirmed at `now`: a sample, after hysteresis,
+    /// that has crossed all confirmed bounds and no others.
     fn confirmed(&self, state: &AttributeState, now: Micros) -> Option<BigRational> {
         let believed = state.believed.as_ref()?;
         let mut confirmed = Vec::new();
@@ -350,7 +350,7 @@ impl AttributeFilter {
         }
     }
 
-    /// Returns a value that satisfies the fewest bounds, the lowest one if several do; `None` without bounds.
+    /// Returns a value that satisfies the fewest bounds, from the lowest such cell; `None` without bounds.
     /// Cells without a plausible value do not count. A value beyond all bounds may lie outside of the plausible
     /// range, if another value of its cell does not.
     pub(crate) fn worst(&self) -> Option<BigRational> {

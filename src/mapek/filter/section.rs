@@ -78,8 +78,8 @@ pub struct MeasuredSection {
     #[serde(default)]
     #[schemars(with = "Option<f64>")]
     maximum: Number,
-    /// Maximum plausible difference between consecutive samples. A sample with a larger difference
-    /// takes effect if the next sample confirms it.
+    /// Maximum plausible difference between consecutive samples. A larger difference takes effect if
+    /// the next sample confirms it.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     jump: Number,

@@ -127,8 +127,8 @@ type History = Vec<(u64, Option<i64>)>;
 
 /// Value in thousandths that is believed at the end of a history, computed from the definition of debouncing for each
 /// bound on its own. A bound changes as soon as all samples of the last `debounce`, and at least `agree` of the last
-/// `of` samples since the last change after which no bound was crossed, lie on its other side. Of the samples that lie in the cell with these changes,
-/// the latest one is believed.
+/// `of` counted samples, lie on its other side. Samples count since the last change after which the latest sample
+/// crossed no bound. Of the samples that lie in the cell with these changes, the latest one is believed.
 fn believed(history: &History, bounds: &[i64], debounce: u64, agree: usize, of: usize) -> i64 {
     let samples: Vec<(u64, i64)> =
         history.iter().filter_map(|(time, sample)| sample.map(|sample| (*time, sample))).collect();
