@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
 use metaplan::message::Errors;
@@ -141,28 +141,36 @@ impl Generated {
     }
 
     fn mission(&self, domain: &str, directory: &Path) -> Mission {
-        let file = |name: &str, text: &str| -> PathBuf {
-            let path = directory.join(name);
-            std::fs::write(&path, text).expect("a file");
-            path
-        };
-        let sources = Sources {
-            documents: vec![file("kb.ttl", &self.knowledge)],
-            rules: vec![COADAPTATION.to_owned()],
-            options: ReadOptions::default(),
-            limits: StepLimits::default(),
-        };
         // The explicit form counts design changes by actions, so it needs no binding.
         let bindings = if domain == self.plain { self.bindings.clone() } else { BTreeMap::new() };
-        let mission: Result<Mission, Errors> = Mission::new(
-            "generated",
-            Some(Knowledge::read(&sources)),
-            Bindings::with(&bindings).expect("bindings"),
-            Ok(Source::new("domain", domain)),
-            Ok(Source::new("problem", self.problem.as_str())),
-        );
+        let mission = read(directory, &self.knowledge, domain, &self.problem, &bindings);
         mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}"))
     }
+}
+
+/// Reads a mission of texts. The knowledge base is written to a file in `directory`.
+fn read(
+    directory: &Path,
+    knowledge: &str,
+    domain: &str,
+    problem: &str,
+    bindings: &BTreeMap<String, String>,
+) -> Result<Mission, Errors> {
+    let file = directory.join("kb.ttl");
+    std::fs::write(&file, knowledge).expect("a file");
+    let sources = Sources {
+        documents: vec![file],
+        rules: vec![COADAPTATION.to_owned()],
+        options: ReadOptions::default(),
+        limits: StepLimits::default(),
+    };
+    Mission::new(
+        "generated",
+        Some(Knowledge::read(&sources)),
+        Bindings::with(bindings).expect("bindings"),
+        Ok(Source::new("domain", domain)),
+        Ok(Source::new("problem", problem)),
+    )
 }
 
 /// Returns the explicit form of the domain: actions with parameters for functions and designs. A change of
@@ -261,4 +269,48 @@ fn generated_missions_have_the_same_optimum_in_both_forms() {
     }
     // Guards against generated missions that are mostly unsolvable.
     assert!(solved[0] > 20 && solved[1] > 20, "{solved:?} missions have a plan");
+}
+
+/// Two actions: `first` requires a design without light, and `second` a design with light.
+const CHANGE: &str = ":f a t:Function . :start a t:QualityAttributeType . :light a t:QualityAttributeType .
+    :a_first a t:Action ; t:requiresF :f ; t:requiresQuality [ a t:Requirement ; t:isQAtype :light ; t:hasMaximum 0 ] .
+    :a_second a t:Action ; t:requiresF :f ; t:requiresQuality [ a t:Requirement ; t:isQAtype :light ; t:hasMinimum 1 ] .
+    :fd_lidar a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :start ; t:hasValue 4 ] ,
+      [ a t:QAvalue ; t:isQAtype :light ; t:hasValue 0 ] .
+    :fd_camera a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :light ; t:hasValue 1 ] .";
+
+fn check_small(knowledge: &str, domain: &str, bindings: &[(&str, &str)], cost: &str, designs: &[&str]) {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    // A fact of a derived predicate cannot be stated.
+    let fact = if domain.contains("(:derived (open) (door))") { "(door)" } else { "(open)" };
+    let problem = format!(
+        "(define (problem p) (:domain d) (:init (= (total-cost) 0) {fact}) (:goal (done))
+          (:metric minimize (total-cost)))"
+    );
+    let bindings = bindings.iter().map(|(symbol, query)| ((*symbol).to_owned(), (*query).to_owned()));
+    let knowledge = format!("{PREFIX}{knowledge}");
+    let mission = read(directory.path(), &knowledge, domain, &problem, &bindings.collect());
+    let (status, actual, steps) =
+        answer(&mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}")));
+    assert_eq!((status, actual.as_deref()), (Status::Optimal, Some(cost)), "{domain}");
+    let actual: Vec<&str> = steps.iter().flatten().map(|(_, design)| design.as_str()).collect();
+    assert_eq!(actual, designs, "{domain}");
+}
+
+#[test]
+fn a_change_to_a_design_without_an_estimation_is_free() {
+    let domain = |functions: &str, cost: &str| {
+        format!(
+            "(define (domain d) (:predicates (open) (one) (done)) (:functions (total-cost) {functions})
+              (:action first :parameters () :precondition (open)
+                :effect (and (one) (increase (total-cost) (+ 1 {cost})) (increase (total-cost) (change))))
+              (:action second :parameters () :precondition (one)
+                :effect (and (done) (increase (total-cost) 1) (increase (total-cost) (change)))))"
+        )
+    };
+    let bindings = [("change", "reconfigured:start"), ("used", "chosen:start")];
+    check_small(CHANGE, &domain("(change)", "0"), &bindings[..1], "2", &["fd_lidar", "fd_camera"]);
+    // The chosen design of `first` costs 4. A sum over chosen designs is undefined without an estimation, so it has
+    // another function than the sum over newly chosen designs.
+    check_small(CHANGE, &domain("(change) (used)", "(used)"), &bindings, "6", &["fd_lidar", "fd_camera"]);
 }

@@ -412,20 +412,26 @@ impl Fill<'_> {
             }
             _ => {}
         }
-        if values.is_empty() {
-            return;
-        }
-        let arguments_of = |element: &InitialElement| match element {
-            InitialElement::Value(atom, _, _) if atom.predicate.name == *name => Some(names(&atom.arguments)),
-            _ => None,
-        };
-        let stated: HashSet<Vec<Name>> = self.problem.init.iter().filter_map(arguments_of).collect();
-        for (arguments, value) in values {
-            let key: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
-            if !stated.contains(&key) && arguments.iter().all(|argument| is_pddl_name(argument)) {
-                let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-                self.problem.init.push(InitialElement::Value(atom(name, &arguments), value, Span::default()));
-            }
+        add_values(self.problem, name, values);
+    }
+}
+
+/// Adds values of a numeric function to a problem, except for arguments for which the problem states a value and
+/// arguments that are not PDDL names.
+pub(super) fn add_values(problem: &mut Problem, function: &Name, values: Vec<(Vec<String>, BigRational)>) {
+    if values.is_empty() {
+        return;
+    }
+    let arguments_of = |element: &InitialElement| match element {
+        InitialElement::Value(atom, _, _) if atom.predicate.name == *function => Some(names(&atom.arguments)),
+        _ => None,
+    };
+    let stated: HashSet<Vec<Name>> = problem.init.iter().filter_map(arguments_of).collect();
+    for (arguments, value) in values {
+        let key: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
+        if !stated.contains(&key) && arguments.iter().all(|argument| is_pddl_name(argument)) {
+            let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+            problem.init.push(InitialElement::Value(atom(function, &arguments), value, Span::default()));
         }
     }
 }

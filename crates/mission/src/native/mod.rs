@@ -12,7 +12,7 @@
 //! chosen designs, unless the attribute is measured or the function has an initial value. A function that is bound to
 //! `chosen:ATTRIBUTE` is replaced in the same way. A function that is bound to `reconfigured:ATTRIBUTE` is replaced
 //! by the sum over the newly chosen designs, i.e. those that replace another design of their function; the first
-//! design of a function is not counted.
+//! design of a function is not counted, and neither is a design without an estimation.
 //!
 //! As in an explicit domain, the planner chooses the designs for these parameters without grounding them into actions,
 //! unless reconfiguration costs make the designs part of the state.
@@ -31,7 +31,7 @@ use pddl::ast::{
     EffectTime, Expression, Identifier, Name, Problem, Span, Term, TypeExpression, TypedName,
 };
 
-use crate::binding::{Bindings, atom, identifier, is_pddl_name};
+use crate::binding::{Bindings, add_values, atom, identifier, is_pddl_name};
 use crate::message::{Errors, Message};
 use walk::{mentions, walk_uncounted};
 
@@ -237,14 +237,13 @@ impl CoAdaptation {
     }
 
     /// For each quality bound, adds facts to the problem for the designs that meet it. A design that lacks an
-    /// estimate still meets the bound if no design of its functions has an estimate of the attribute.
+    /// estimate still meets the bound if no design of its functions has an estimate of the attribute. Adds the values
+    /// for changes of designs that the bindings do not add.
     pub(super) fn fill(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
+        self.fill_changes(problem, designs);
         for quality in self.quality() {
             for design in designs {
-                let concerned = self.needed().any(|needed| {
-                    design.solves.iter().any(|function| function.name == needed.name)
-                        && needed.attributes.contains(&quality.bounds.attribute)
-                });
+                let concerned = self.is_concerned(design, &quality.bounds.attribute);
                 let kept = design.estimations.get(&quality.bounds.attribute).is_some_and(|value| {
                     quality.bounds.minimum.as_ref().is_none_or(|minimum| value >= minimum)
                         && quality.bounds.maximum.as_ref().is_none_or(|maximum| value <= maximum)
@@ -254,6 +253,44 @@ impl CoAdaptation {
                     problem.init.push(pddl::ast::InitialElement::Fact(fact));
                 }
             }
+        }
+    }
+
+    /// Adds the value 0 for a change to a design without an estimation. Without a value, no action could change to the
+    /// design.
+    fn fill_changes(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
+        let attributes: BTreeSet<&String> = self.changed.values().collect();
+        for attribute in attributes {
+            let function = self.change_of(attribute);
+            let is_filled_by_binding = function == value_of(attribute);
+            let concerned = designs.iter().filter(|design| self.is_concerned(design, attribute));
+            let values = concerned.filter_map(|design| {
+                let value = match design.estimations.get(attribute) {
+                    Some(_) if is_filled_by_binding => return None,
+                    Some(value) => value.clone(),
+                    None => BigRational::zero(),
+                };
+                Some((vec![design.individual.name.clone()], value))
+            });
+            add_values(problem, &Name::new(&function), values.collect());
+        }
+    }
+
+    /// Returns `true` if the design solves a required function of which some design has an estimation of the attribute.
+    fn is_concerned(&self, design: &FunctionDesign, attribute: &str) -> bool {
+        self.needed().any(|needed| {
+            design.solves.iter().any(|function| function.name == needed.name)
+                && needed.attributes.contains(attribute)
+        })
+    }
+
+    /// Returns the name of the numeric function that has the value of an attribute for a change to a design. It differs
+    /// from that for a chosen design if both are used, because only a change is free without an estimation.
+    fn change_of(&self, attribute: &str) -> String {
+        if self.chosen.values().any(|chosen| chosen == attribute) {
+            value_of(&format!("reconfigured_{attribute}"))
+        } else {
+            value_of(attribute)
         }
     }
 
@@ -283,8 +320,10 @@ impl CoAdaptation {
     }
 
     fn functions(&self) -> Vec<Declaration> {
-        let attributes: BTreeSet<&String> = self.chosen.values().chain(self.changed.values()).collect();
-        attributes.into_iter().map(|attribute| declaration(&value_of(attribute), &[("fd", DESIGN)])).collect()
+        let chosen = self.chosen.values().map(|attribute| value_of(attribute));
+        let changed = self.changed.values().map(|attribute| self.change_of(attribute));
+        let names: BTreeSet<String> = chosen.chain(changed).collect();
+        names.iter().map(|name| declaration(name, &[("fd", DESIGN)])).collect()
     }
 
     fn adapt(&self, action: &mut Action, needs: &Needs, domain: &Domain) {
@@ -369,7 +408,7 @@ impl CoAdaptation {
                         let Expression::Fluent(fluent) = part else { return };
                         let attribute = self.changed.get(&fluent.predicate.name);
                         if let Some(attribute) = attribute.filter(|own| needed.attributes.contains(*own)) {
-                            *part = Expression::Fluent(of_design(&value_of(attribute), design, None));
+                            *part = Expression::Fluent(of_design(&self.change_of(attribute), design, None));
                         }
                     });
                     let counts = mentions(expression, &|name| self.changed.contains_key(name));
