@@ -279,6 +279,15 @@ const CHANGE: &str = ":f a t:Function . :start a t:QualityAttributeType . :light
       [ a t:QAvalue ; t:isQAtype :light ; t:hasValue 0 ] .
     :fd_camera a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :light ; t:hasValue 1 ] .";
 
+/// A quality bound for the action `enter`, in a context that the predicate `(open ?a)` states.
+const CONTEXT: &str = ":f a t:Function . :effort a t:QualityAttributeType . :light a t:QualityAttributeType .
+    :a_enter a t:Action ; t:requiresF :f ; t:requiresQuality :r .
+    :r a t:Requirement ; t:isQAtype :light ; t:hasMinimum 1 ; t:inContext \"open\" .
+    :fd_a a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :effort ; t:hasValue 1 ] ,
+      [ a t:QAvalue ; t:isQAtype :light ; t:hasValue 0 ] .
+    :fd_b a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :effort ; t:hasValue 2 ] ,
+      [ a t:QAvalue ; t:isQAtype :light ; t:hasValue 1 ] .";
+
 fn check_small(knowledge: &str, domain: &str, bindings: &[(&str, &str)], cost: &str, designs: &[&str]) {
     let directory = tempfile::tempdir().expect("a temporary directory");
     // A fact of a derived predicate cannot be stated.
@@ -313,4 +322,18 @@ fn a_change_to_a_design_without_an_estimation_is_free() {
     // The chosen design of `first` costs 4. A sum over chosen designs is undefined without an estimation, so it has
     // another function than the sum over newly chosen designs.
     check_small(CHANGE, &domain("(change) (used)", "(used)"), &bindings, "6", &["fd_lidar", "fd_camera"]);
+}
+
+#[test]
+fn a_context_that_ends_at_the_start_of_an_action_counts() {
+    let domain = |ended: &str, axiom: &str| {
+        format!(
+            "(define (domain d) (:requirements :durative-actions :derived-predicates)
+              (:predicates (open) (door) (done)) (:functions (total-cost) (effort)) {axiom}
+              (:durative-action enter :parameters () :duration (= ?duration 1) :condition (at start ({ended}))
+                :effect (and (at start (not ({ended}))) (at end (done)) (at end (increase (total-cost) (effort))))))"
+        )
+    };
+    check_small(CONTEXT, &domain("open", ""), &[], "2", &["fd_b"]);
+    check_small(CONTEXT, &domain("door", "(:derived (open) (door))"), &[], "2", &["fd_b"]);
 }

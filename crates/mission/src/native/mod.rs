@@ -6,7 +6,7 @@
 //! design of each function that the action requires. The action also gets conditions: the design solves the
 //! function, is available, and meets the quality bounds of the action (`t:requiresQuality`). A quality bound with a
 //! context, which is a predicate of the domain, applies only while this predicate holds for the action's
-//! parameters.
+//! parameters, including the moment at which the action starts.
 //!
 //! A numeric function without parameters that is named like an estimated attribute is replaced by the sum over the
 //! chosen designs, unless the attribute is measured or the function has an initial value. A function that is bound to
@@ -363,6 +363,9 @@ impl CoAdaptation {
                     condition.change_leaves(&mut |leaf| rewrite(leaf));
                 }
                 conditions.extend(chosen.into_iter().map(|condition| (ConditionTime::AtStart, condition)));
+                // A context that the action ends at its start holds then, but not in the interval after the start.
+                let ended = lasting.iter().filter(|condition| is_ended_context(condition, effects, domain));
+                conditions.extend(ended.map(|condition| (ConditionTime::AtStart, condition.clone())));
                 conditions.extend(lasting.into_iter().map(|condition| (ConditionTime::OverAll, condition)));
                 let mut additions = Vec::new();
                 for (time, effect) in &mut *effects {
@@ -480,6 +483,32 @@ fn conditions(
         }
     }
     (chosen, lasting)
+}
+
+/// Returns `true` if a condition is a quality bound with a context that the start effects of the action may end. The
+/// truth of a derived predicate may depend on every effect.
+fn is_ended_context(condition: &Condition, effects: &[(EffectTime, Effect)], domain: &Domain) -> bool {
+    let Condition::Or(parts) = condition else { return false };
+    let context = parts.iter().find_map(|part| match part {
+        Condition::Not(context) => match &**context {
+            Condition::Atom(context) => Some(&context.predicate.name),
+            _ => None,
+        },
+        _ => None,
+    });
+    let is_derived =
+        |context: &Name| domain.derived.iter().any(|axiom| axiom.head.identifier.name == *context);
+    let mut starts = effects.iter().filter(|(time, _)| *time == EffectTime::AtStart);
+    context.is_some_and(|context| starts.any(|(_, effect)| is_derived(context) || deletes(effect, context)))
+}
+
+fn deletes(effect: &Effect, predicate: &Name) -> bool {
+    match effect {
+        Effect::And(parts) => parts.iter().any(|part| deletes(part, predicate)),
+        Effect::ForAll(_, inner) | Effect::When(_, inner) => deletes(inner, predicate),
+        Effect::Delete(atom) => atom.predicate.name == *predicate,
+        Effect::Add(_) | Effect::Assign(..) => false,
+    }
 }
 
 /// Returns the condition that `function` was last configured with another design than `design`.
