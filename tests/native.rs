@@ -337,3 +337,66 @@ fn a_context_that_ends_at_the_start_of_an_action_counts() {
     check_small(CONTEXT, &domain("open", ""), &[], "2", &["fd_b"]);
     check_small(CONTEXT, &domain("door", "(:derived (open) (door))"), &[], "2", &["fd_b"]);
 }
+
+/// One function with one design. The statements of a test are added to these.
+const ONE_DESIGN: &str = "@prefix o: <urn:o#> . :f a t:Function . :effort a t:QualityAttributeType .
+    :a_go a t:Action ; t:requiresF :f .
+    :fd_a a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :effort ; t:hasValue 1 ] .\n";
+
+fn with_statements(statements: &str) -> Result<Mission, Errors> {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let domain = "(define (domain d) (:predicates (done)) (:functions (total-cost) (effort))
+        (:action go :parameters () :precondition () :effect (and (done) (increase (total-cost) (effort)))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0)) (:goal (done))
+        (:metric minimize (total-cost)))";
+    let knowledge = format!("{PREFIX}{ONE_DESIGN}{statements}");
+    read(directory.path(), &knowledge, domain, problem, &BTreeMap::new())
+}
+
+#[test]
+fn individuals_with_one_name_in_pddl_are_refused() {
+    let bound = "a t:Requirement ; t:isQAtype :effort ; t:hasMaximum";
+    for (statements, first, second) in [
+        ("o:fd_a a t:FunctionDesign ; t:solvesF :f .", "<urn:m#fd_a>", "<urn:o#fd_a>"),
+        (":FD_A a t:FunctionDesign ; t:solvesF :f .", "<urn:m#FD_A>", "<urn:m#fd_a>"),
+        ("o:f a t:Function . :fd_b a t:FunctionDesign ; t:solvesF o:f .", "<urn:m#f>", "<urn:o#f>"),
+        (
+            "o:fd_a a t:Function . :fd_b a t:FunctionDesign ; t:solvesF o:fd_a .",
+            "<urn:m#fd_a>",
+            "<urn:o#fd_a>",
+        ),
+        (
+            format!(":a_go t:requiresQuality :q , o:q . :q {bound} 1 . o:q {bound} 2 .").as_str(),
+            "<urn:m#q>",
+            "<urn:o#q>",
+        ),
+        (
+            "o:effort a t:QualityAttributeType . [] a t:QAvalue ; t:isQAtype o:effort ; t:hasValue 2 .",
+            "<urn:m#effort>",
+            "<urn:o#effort>",
+        ),
+        (":go a t:Action ; t:requiresF :f .", "<urn:m#a_go>", "<urn:m#go>"),
+    ] {
+        let messages = with_statements(statements).map(|_| ()).expect_err(statements);
+        let messages: Vec<_> = messages.iter().collect();
+        let [message] = messages[..] else { panic!("{statements}: {messages:#?}") };
+        assert_eq!(message.code, "M225", "{statements}: {messages:#?}");
+        for iri in [first, second] {
+            assert!(message.message.contains(iri), "{statements}: no {iri}: {messages:#?}");
+        }
+    }
+}
+
+#[test]
+fn equal_names_outside_of_the_problem_are_accepted() {
+    for statements in [
+        "o:fd_a a t:Component .",
+        "o:fd_a a t:QualityAttributeType .",
+        "o:effort a t:QualityAttributeType .",
+        "o:a_go a t:Action .",
+        ":Effort a t:Component .",
+    ] {
+        let mission = with_statements(statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
+        assert_eq!(answer(&mission).1.as_deref(), Some("1"), "{statements}");
+    }
+}

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use num_rational::BigRational;
 
-use ontology::tomasys::{Individual, View};
+use ontology::tomasys::{Action, FunctionDesign, Individual, View};
 use ontology::vocab::local_name;
 use pddl::ast::{
     Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
@@ -123,9 +123,9 @@ impl Bindings {
     /// to the action `known` of the knowledge base. Without an explicit binding, the names must agree, except
     /// that the action may have the prefix `a_`.
     pub(super) fn is_action(&self, name: &Name, known: &Individual) -> bool {
-        both(known).iter().any(|known| match self.own.get(name) {
-            Some(Query::Action(own)) => own == known,
-            _ => Name::new(known) == *name || Name::new(known) == Name::new(&format!("a_{name}")),
+        both(known).iter().any(|local| match self.own.get(name) {
+            Some(Query::Action(own)) => own == local || *own == known.iri,
+            _ => Name::new(local) == *name || Name::new(local) == Name::new(&format!("a_{name}")),
         })
     }
 
@@ -277,6 +277,78 @@ pub(super) fn fill(
     fill.warnings
 }
 
+/// Returns the individuals that [`fill`] uses as objects of a problem.
+pub(super) fn individuals(
+    domain: &Domain,
+    knowledge: &Knowledge,
+    bindings: &Bindings,
+) -> BTreeSet<Individual> {
+    let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
+    let mut individuals = BTreeSet::new();
+    for declared in &domain.types {
+        if let Some(class) = bindings.class(&declared.identifier.name) {
+            individuals.extend(catalogue.members(&view, &class).iter().cloned());
+        }
+    }
+    let designs = || catalogue.designs().iter();
+    for declared in &domain.predicates {
+        match bindings.predicate(&declared.identifier.name) {
+            Some(Query::Solves) if declared.parameters.len() == 2 => {
+                individuals.extend(designs().map(|design| design.individual.clone()));
+                individuals.extend(designs().flat_map(|design| design.solves.iter().cloned()));
+            }
+            Some(Query::Available) if declared.parameters.len() == 1 => {
+                individuals.extend(designs().map(|design| design.individual.clone()));
+            }
+            Some(Query::Requires(only)) => {
+                let actions = catalogue.actions().iter();
+                let fits = |action: &&Action| {
+                    is_only(action, only.as_deref()) && action.requires.len() + 1 == declared.parameters.len()
+                };
+                for action in actions.filter(fits) {
+                    individuals.insert(action.individual.clone());
+                    individuals.extend(action.requires.iter().cloned());
+                }
+            }
+            _ => {}
+        }
+    }
+    for declared in domain.functions.iter().filter(|declared| declared.parameters.len() == 1) {
+        if let Query::Estimation(attribute) = bindings.function(declared) {
+            let is_estimated = |design: &&FunctionDesign| estimation(design, &attribute).is_some();
+            individuals.extend(designs().filter(is_estimated).map(|design| design.individual.clone()));
+        }
+    }
+    individuals.retain(|individual| is_pddl_name(&individual.name));
+    individuals
+}
+
+/// Returns the names of the attributes whose estimations or measurements are values of the functions of a domain.
+pub(super) fn attributes(domain: &Domain, bindings: &Bindings) -> BTreeSet<String> {
+    let queries = domain.functions.iter().map(|declared| (declared, bindings.function(declared)));
+    let attributes = queries.filter_map(|(declared, query)| match query {
+        Query::Estimation(attribute) if declared.parameters.len() == 1 => Some(attribute),
+        Query::Measured(attribute) if declared.parameters.is_empty() => Some(attribute),
+        _ => None,
+    });
+    attributes.flat_map(|attribute| [plain(&attribute).to_owned(), attribute]).collect()
+}
+
+/// Returns `true` if the action has the name `only`, or if there is no such name.
+fn is_only(action: &Action, only: Option<&str>) -> bool {
+    only.is_none_or(|only| both(&action.individual).iter().any(|own| only.eq_ignore_ascii_case(own)))
+}
+
+/// Returns the estimation of a design for the attribute to which a function is bound, whose name may have the prefix
+/// `fd_`.
+fn estimation<'d>(design: &'d FunctionDesign, attribute: &str) -> Option<&'d BigRational> {
+    design.estimations.get(attribute).or_else(|| design.estimations.get(plain(attribute)))
+}
+
+fn plain(attribute: &str) -> &str {
+    attribute.strip_prefix("fd_").unwrap_or(attribute)
+}
+
 struct Fill<'a> {
     problem: &'a mut Problem,
     view: View<'a>,
@@ -365,9 +437,7 @@ impl Fill<'_> {
     fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
         let stated = self.stated(&declared.identifier.name);
         for action in self.known.actions() {
-            let named =
-                |only: &str| both(&action.individual).iter().any(|own| only.eq_ignore_ascii_case(own));
-            if only.is_some_and(|only| !named(only)) {
+            if !is_only(action, only) {
                 continue;
             }
             let functions: Vec<&str> =
@@ -400,9 +470,8 @@ impl Fill<'_> {
         let mut values: Vec<(Vec<String>, BigRational)> = Vec::new();
         match query {
             Query::Estimation(attribute) if declared.parameters.len() == 1 => {
-                let plain = attribute.strip_prefix("fd_").unwrap_or(attribute);
                 for design in self.known.designs() {
-                    let value = design.estimations.get(attribute).or_else(|| design.estimations.get(plain));
+                    let value = estimation(design, attribute);
                     values.extend(value.map(|value| (vec![design.individual.name.clone()], value.clone())));
                 }
             }

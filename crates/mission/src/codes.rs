@@ -172,9 +172,9 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "M225",
-        "Two entries of `[bindings.names]` contradict each other.",
-        "One object would be two individuals, or one individual two objects.",
-        "Remove one of them.",
+        "Two individuals have one name in PDDL.",
+        "Their names differ only in the namespace or in case, which PDDL ignores, or entries of `[bindings.names]` contradict each other. One object would be two individuals, or one individual two objects.",
+        "Rename one of them, or correct the entries.",
     ],
     [
         "M226",

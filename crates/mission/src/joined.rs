@@ -50,8 +50,8 @@ impl Mission {
     ///
     /// # Errors
     /// Errors of the knowledge base, unreadable files, files of another kind, and syntax errors of the domain and the
-    /// problem. Without such errors: errors of `[bindings.names]`, required functions without a common design, and
-    /// errors of co-adaptation. Symbols and types of PDDL are not checked; see [`Mission::filled`].
+    /// problem. Without such errors: errors of `[bindings.names]`, required functions without a common design,
+    /// errors of co-adaptation, and different individuals with one name. Symbols and types of PDDL are not checked; see [`Mission::filled`].
     pub fn new(
         name: &str,
         knowledge: Option<Result<Knowledge, Errors>>,
@@ -113,9 +113,16 @@ impl Mission {
             }
             _ => None,
         };
-        let domain = adaptation
-            .as_ref()
-            .map_or_else(|| domain.clone(), |problem_designs| problem_designs.explicit(&domain));
+        let domain =
+            adaptation.as_ref().map_or_else(|| domain.clone(), |adaptation| adaptation.explicit(&domain));
+        let merged = match (&knowledge, &planta) {
+            (Some(knowledge), Some(planta)) => names::merged_by_planta(knowledge, planta),
+            (Some(knowledge), None) => names::merged(&domain, knowledge, &bindings, adaptation.as_ref()),
+            (None, _) => Vec::new(),
+        };
+        if !merged.is_empty() {
+            return Err(merged.into());
+        }
         let name = name.to_owned();
         Ok(Self {
             name,

@@ -17,9 +17,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
 use num_rational::BigRational;
-use rules::{Engine, Literal, Symbol, Value};
+use rules::{Engine, Fact, Literal, Symbol, Value};
 
-use crate::vocab::local_name;
+use crate::vocab::{local_name, owl};
 use terms::Term;
 
 /// An individual with its IRI and name.
@@ -180,6 +180,23 @@ impl<'a> View<'a> {
     /// Returns all quality attribute types, sorted by IRI.
     pub fn attribute_types(&self) -> Vec<Individual> {
         self.members(terms::ATTRIBUTE_TYPE)
+    }
+
+    /// Returns the quality attribute types of all values and bounds, sorted by IRI.
+    pub fn used_attribute_types(&self) -> Vec<Individual> {
+        let edges = terms::IS_TYPE.iter().map(|property| self.edges(property, true));
+        let kinds: Vec<Symbol> = edges.flat_map(|edges| edges.keys().copied().collect::<Vec<_>>()).collect();
+        sorted(kinds.into_iter().filter_map(|kind| self.individual(kind)))
+    }
+
+    /// Returns `true` if two IRIs are equal, or if the facts state that they name one individual.
+    pub fn are_same(&self, iri: &str, other: &str) -> bool {
+        let symbol = |name: &str| self.engine.symbols().find_name(name);
+        let (same_as, names) = (symbol(owl::SAME_AS), symbol(iri).zip(symbol(other)));
+        iri == other
+            || same_as.zip(names).is_some_and(|(same_as, (first, second))| {
+                self.engine.holds(&Fact::new(same_as, [first, second]))
+            })
     }
 
     /// Returns all function designs, sorted by IRI.

@@ -25,7 +25,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use num_rational::BigRational;
 use num_traits::Zero as _;
-use ontology::tomasys::{FunctionDesign, Quality, View};
+use ontology::tomasys::{FunctionDesign, Individual, Quality, View};
 use pddl::ast::{
     Action, ActionBody, Arithmetic, Assignment, Condition, ConditionTime, Declaration, Domain, Effect,
     EffectTime, Expression, Identifier, Name, Problem, Span, Term, TypeExpression, TypedName,
@@ -83,14 +83,23 @@ impl CoAdaptation {
         }
         let designs = view.function_designs();
         let known_actions = view.actions();
-        let mut actions = BTreeMap::new();
+        let (mut actions, mut errors) = (BTreeMap::new(), Vec::new());
         for action in &domain.actions {
             let name = &action.identifier.name;
-            let Some(known_action) =
-                known_actions.iter().find(|action| bindings.is_action(name, &action.individual))
-            else {
-                continue;
-            };
+            let mut matching = known_actions.iter().filter(|action| {
+                bindings.is_action(name, &action.individual)
+                    && !(action.requires.is_empty() && action.quality.is_empty())
+            });
+            let Some(known_action) = matching.next() else { continue };
+            let iri = &known_action.individual.iri;
+            if let Some(other) = matching.find(|other| !view.are_same(iri, &other.individual.iri)) {
+                let text = format!(
+                    "the action `{name}` corresponds to both <{iri}> and <{other}>; bind it to one of them: `{name} = \
+                     \"action:{iri}\"`",
+                    other = other.individual.iri
+                );
+                errors.push(Message::error("M225", text));
+            }
             let functions = known_action.requires.iter().map(|function| Needed {
                 name: function.name.clone(),
                 attributes: estimated(designs.iter().filter(|design| design.solves.contains(function))),
@@ -101,12 +110,12 @@ impl CoAdaptation {
                 actions.insert(name.clone(), Needs { functions, quality, parameters });
             }
         }
-        if actions.is_empty() {
+        if actions.is_empty() && errors.is_empty() {
             return Ok(None);
         }
         let (chosen, changed) = attributes(domain, problem, view, &designs, bindings);
         let adaptation = Self { actions, chosen, changed };
-        let mut errors = adaptation.errors(domain);
+        errors.extend(adaptation.errors(domain));
         errors.extend(adaptation.valued(problem));
         if errors.is_empty() { Ok(Some(adaptation)) } else { Err(errors.into()) }
     }
@@ -303,6 +312,17 @@ impl CoAdaptation {
         bounds.sort_by(|a, b| a.individual.cmp(&b.individual));
         bounds.dedup();
         bounds
+    }
+
+    /// Returns the individuals that hold the quality bounds of the domain's actions. Each has a predicate.
+    pub(crate) fn requirements(&self) -> BTreeSet<Individual> {
+        self.quality().into_iter().map(|quality| quality.individual.clone()).collect()
+    }
+
+    /// Returns the names of the attributes of sums over designs and of quality bounds.
+    pub(crate) fn attributes(&self) -> BTreeSet<String> {
+        let bounded = self.quality().into_iter().map(|quality| &quality.bounds.attribute);
+        self.chosen.values().chain(self.changed.values()).chain(bounded).cloned().collect()
     }
 
     fn predicates(&self) -> Vec<Declaration> {
