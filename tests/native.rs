@@ -400,3 +400,33 @@ fn equal_names_outside_of_the_problem_are_accepted() {
         assert_eq!(answer(&mission).1.as_deref(), Some("1"), "{statements}");
     }
 }
+
+#[test]
+fn different_values_of_one_attribute_are_refused() {
+    let estimation = |kind: &str, value: &str| {
+        format!(
+            ":fd_a t:hasQAestimation :v{value} . :v{value} a t:QAvalue ; t:isQAtype {kind} ; t:hasValue {value} ."
+        )
+    };
+    let measured = |value: &str| {
+        format!(":w{value} a t:QAvalue ; t:isQAtype :effort ; t:isMeasured true ; t:hasValue {value} .")
+    };
+    let twice = |part: &dyn Fn(&str) -> String| format!("{}\n{}", part("2"), part("7"));
+    for (statements, words) in [
+        (estimation(":effort", "7"), ["<urn:m#fd_a> has two estimations of `effort`", "7 (<urn:m#v7>)"]),
+        (twice(&measured), ["2 (<urn:m#w2>)", "7 (<urn:m#w7>)"]),
+    ] {
+        let messages = with_statements(&statements).map(|_| ()).expect_err(&statements);
+        let messages: Vec<_> = messages.iter().collect();
+        let [message] = messages[..] else { panic!("{statements}: {messages:#?}") };
+        assert_eq!(message.code, "M234", "{statements}: {messages:#?}");
+        for word in words {
+            assert!(message.message.contains(word), "{statements}: no `{word}`: {messages:#?}");
+        }
+    }
+    // Equal values, and values that the problem does not use.
+    for statements in [estimation(":effort", "1"), twice(&|value| estimation(":beauty", value))] {
+        let mission = with_statements(&statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
+        assert_eq!(answer(&mission).1.as_deref(), Some("1"), "{statements}");
+    }
+}

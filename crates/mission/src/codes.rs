@@ -207,6 +207,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Remove the binding if the function is a variable of the problem, and otherwise the value.",
     ],
     [
+        "M234",
+        "An attribute has several values.",
+        "A design has different estimations of one attribute, or an attribute has different measured values. The problem uses the attribute, and nothing decides which value counts.",
+        "Remove all values but one.",
+    ],
+    [
         "M310",
         "The adaptation loop does not support a part of the mission.",
         "A timed initial literal, or a constraint or preference over the whole trajectory, refers to the past of the mission.",

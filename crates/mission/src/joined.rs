@@ -14,6 +14,7 @@ use crate::message::{Errors, Message};
 use crate::names::{self, Meeting, NeverNamed};
 use crate::native::CoAdaptation;
 use crate::planta::Planta;
+use crate::values::several_values;
 
 /// A mission that is ready for planning: a domain, a problem and, optionally, a knowledge base.
 #[derive(Debug, Clone)]
@@ -51,7 +52,7 @@ impl Mission {
     /// # Errors
     /// Errors of the knowledge base, unreadable files, files of another kind, and syntax errors of the domain and the
     /// problem. Without such errors: errors of `[bindings.names]`, required functions without a common design,
-    /// errors of co-adaptation, and different individuals with one name. Symbols and types of PDDL are not checked; see [`Mission::filled`].
+    /// errors of co-adaptation, different individuals with one name, and different values of one attribute. Symbols and types of PDDL are not checked; see [`Mission::filled`].
     pub fn new(
         name: &str,
         knowledge: Option<Result<Knowledge, Errors>>,
@@ -115,13 +116,18 @@ impl Mission {
         };
         let domain =
             adaptation.as_ref().map_or_else(|| domain.clone(), |adaptation| adaptation.explicit(&domain));
-        let merged = match (&knowledge, &planta) {
+        let ambiguous = match (&knowledge, &planta) {
             (Some(knowledge), Some(planta)) => names::merged_by_planta(knowledge, planta),
-            (Some(knowledge), None) => names::merged(&domain, knowledge, &bindings, adaptation.as_ref()),
+            (Some(knowledge), None) => {
+                let adaptation = adaptation.as_ref();
+                let mut errors = names::merged(&domain, knowledge, &bindings, adaptation);
+                errors.extend(several_values(&domain, knowledge, &bindings, adaptation));
+                errors
+            }
             (None, _) => Vec::new(),
         };
-        if !merged.is_empty() {
-            return Err(merged.into());
+        if !ambiguous.is_empty() {
+            return Err(ambiguous.into());
         }
         let name = name.to_owned();
         Ok(Self {

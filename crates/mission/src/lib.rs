@@ -22,6 +22,7 @@ mod names;
 mod native;
 mod planta;
 mod set;
+mod values;
 pub mod visible;
 
 pub use binding::{Bindings, atom};

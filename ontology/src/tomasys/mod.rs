@@ -50,7 +50,8 @@ pub struct FunctionDesign {
     pub solves: Vec<Individual>,
     /// The components that the design requires.
     pub components: Vec<Individual>,
-    /// Maps the name of each estimated attribute type to the estimated value, in the unit of the type.
+    /// Maps the name of each estimated attribute type to the estimated value, in the unit of the type. Of several
+    /// values, this is the largest.
     pub estimations: BTreeMap<String, BigRational>,
     /// Bounds on measured attributes.
     pub requirements: Vec<Requirement>,
@@ -89,6 +90,17 @@ pub struct Measurement {
     pub attribute: String,
     /// The value in the unit of the attribute type, if there is one.
     pub value: Option<BigRational>,
+}
+
+/// An estimated value of a design.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Estimation {
+    /// The individual that holds the value.
+    pub individual: Individual,
+    /// Name of the attribute type (as in `Individual::name`).
+    pub attribute: String,
+    /// The value in the unit of the attribute type.
+    pub value: BigRational,
 }
 
 /// An individual of the class Action: the knowledge base states which functions this kind of action requires.
@@ -204,6 +216,16 @@ impl<'a> View<'a> {
         self.members(terms::FUNCTION_DESIGN).into_iter().map(|design| self.function_design(design)).collect()
     }
 
+    /// Returns the estimated values of a design, given by IRI, sorted by the individuals that hold them.
+    pub fn estimations(&self, design_iri: &str) -> Vec<Estimation> {
+        let estimation = |individual: Individual| {
+            let attribute = self.objects(&individual.iri, terms::IS_TYPE).into_iter().next()?.name;
+            let value = self.number(&individual.iri, terms::HAS_VALUE)?;
+            Some(Estimation { individual, attribute, value })
+        };
+        self.objects(design_iri, terms::HAS_ESTIMATION).into_iter().filter_map(estimation).collect()
+    }
+
     /// Returns all components with their statuses, sorted by IRI.
     pub fn components(&self) -> Vec<Component> {
         let status = |component: &Individual| {
@@ -253,10 +275,10 @@ impl<'a> View<'a> {
 
     fn function_design(&self, individual: Individual) -> FunctionDesign {
         let iri = individual.iri.as_str();
-        let attribute = |value: &Individual| self.objects(&value.iri, terms::IS_TYPE).into_iter().next();
-        let estimation =
-            |value: &Individual| Some((attribute(value)?.name, self.number(&value.iri, terms::HAS_VALUE)?));
-        let estimations = self.objects(iri, terms::HAS_ESTIMATION).iter().filter_map(estimation).collect();
+        let mut estimations = self.estimations(iri);
+        // The map keeps the last value of an attribute. The order of individuals has no meaning, so it must not decide.
+        estimations.sort_by(|a, b| a.value.cmp(&b.value));
+        let estimations = estimations.into_iter().map(|own| (own.attribute, own.value)).collect();
         let requirements = self.objects(iri, terms::HAS_REQUIREMENT);
         let requirements = requirements.iter().filter_map(|value| self.requirement(value)).collect();
         let denied = |term| self.literals(iri, term).contains(&&Literal::Boolean(false));
