@@ -430,3 +430,20 @@ fn different_values_of_one_attribute_are_refused() {
         assert_eq!(answer(&mission).1.as_deref(), Some("1"), "{statements}");
     }
 }
+
+#[test]
+fn values_with_the_prefix_of_measurements_can_be_estimations() {
+    let value = "a t:QAvalue ; t:isQAtype :effort ; t:hasValue 5";
+    let design = ":fd_b a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation :obs_b .";
+    for (statements, cost) in [
+        (format!("{design} :obs_b {value} ; t:isMeasured false ."), "1"),
+        (format!("{design} :obs_b {value} ."), "1"),
+        (format!(":obs_b {value} ; t:isMeasured false ."), "1"),
+        // A measured value replaces the estimations of all designs.
+        (format!(":obs_b {value} ."), "5"),
+        (format!(":qa_b {value} ; t:isMeasured true ."), "5"),
+    ] {
+        let mission = with_statements(&statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
+        assert_eq!(answer(&mission).1.as_deref(), Some(cost), "{statements}");
+    }
+}

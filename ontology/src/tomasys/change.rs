@@ -179,9 +179,13 @@ fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str)
 }
 
 /// Returns the individuals that hold measurements of an attribute type: individuals with `isMeasured`
-/// true, and individuals named `obs_…` as in MROS.
+/// true, and individuals named `obs_…` as in MROS that have no `isMeasured` and are no estimations of designs.
 pub(crate) fn holders(facts: Facts, kind: Symbol) -> Vec<Symbol> {
-    let named = |holder| facts.name(holder).is_some_and(|iri| local_name(iri).starts_with("obs_"));
+    let named = |holder| {
+        facts.name(holder).is_some_and(|iri| local_name(iri).starts_with("obs_"))
+            && facts.literals(holder, terms::IS_MEASURED).is_empty()
+            && facts.subjects(holder, terms::HAS_ESTIMATION).is_empty()
+    };
     let mut holders = facts.subjects(kind, terms::IS_TYPE);
     holders.retain(|&holder| named(holder) || facts.is_true(holder, terms::IS_MEASURED));
     holders

@@ -236,12 +236,15 @@ impl<'a> View<'a> {
         components.map(|individual| Component { status: status(&individual), individual }).collect()
     }
 
-    /// Returns all measured values: quality attribute values with `isMeasured` true, or named `obs_…` as in MROS.
-    /// Omits individuals without an attribute type.
+    /// Returns all measured values: quality attribute values with `isMeasured` true, and those named `obs_…` as in MROS
+    /// that have no `isMeasured` and are no estimations of designs. Omits individuals without an attribute type.
     pub fn measurements(&self) -> Vec<Measurement> {
         let measured = |value: &Individual| {
-            value.name.starts_with("obs_")
-                || self.literals(&value.iri, terms::IS_MEASURED).contains(&&Literal::Boolean(true))
+            let stated = self.literals(&value.iri, terms::IS_MEASURED);
+            stated.contains(&&Literal::Boolean(true))
+                || stated.is_empty()
+                    && value.name.starts_with("obs_")
+                    && self.subjects(&value.iri, terms::HAS_ESTIMATION).is_empty()
         };
         let measurement = |individual: Individual| {
             let attribute = self.objects(&individual.iri, terms::IS_TYPE).into_iter().next()?.name;
