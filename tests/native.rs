@@ -447,3 +447,37 @@ fn values_with_the_prefix_of_measurements_can_be_estimations() {
         assert_eq!(answer(&mission).1.as_deref(), Some(cost), "{statements}");
     }
 }
+
+#[test]
+fn settings_do_not_contradict_the_knowledge_base() {
+    let bounded = ":a_go t:requiresQuality :q . :q a t:Requirement ; t:isQAtype :effort ; t:hasMaximum 2 .";
+    let bounded = || with_statements(bounded).expect("a mission");
+    let explicit = || shipped("ugv", &|_| {});
+    for (mut mission, name, value, is_accepted) in [
+        (bounded(), "fd_meets_q fd_a", "false", false),
+        (bounded(), "fd_meets_q fd_a", "true", false),
+        (bounded(), "done", "true", true),
+        (explicit(), "fd_solve_f fd_amcl_kinect f_localization", "false", false),
+        (explicit(), "fd_solve_f fd_amcl_kinect", "f_navigation", false),
+        (explicit(), "fd_solve_f fd_amcl_kinect f_localization", "true", true),
+        (explicit(), "robot_at", "wp2", true),
+    ] {
+        let outcome = mission.set(name, value);
+        assert_eq!(outcome.is_ok(), is_accepted, "{name}={value}: {outcome:?}");
+        assert!(outcome.err().is_none_or(|message| message.code == "M106"), "{name}={value}");
+    }
+}
+
+#[test]
+fn problems_do_not_state_which_designs_meet_a_bound() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let knowledge = format!(
+        "{PREFIX}{ONE_DESIGN}:a_go t:requiresQuality :q . :q a t:Requirement ; t:isQAtype :effort ; t:hasMaximum 0 ."
+    );
+    let domain = "(define (domain d) (:predicates (done))
+        (:action go :parameters () :precondition () :effect (done)))";
+    let problem = "(define (problem p) (:domain d) (:init (fd_meets_q fd_a)) (:goal (done)))";
+    let messages = read(directory.path(), &knowledge, domain, problem, &BTreeMap::new());
+    let messages = messages.map(|_| ()).expect_err("a fact of the knowledge base");
+    assert!(messages.iter().any(|message| message.code == "M116"), "{messages:#?}");
+}

@@ -327,3 +327,43 @@ fn names_that_are_equal_in_pddl_are_refused() {
     check("ClassAssertion(:Cb :i0) ClassAssertion(:Cb :ca)", 0, &[]);
     check("ClassAssertion(:Cb :i0) ClassAssertion(:Cb o:i0) SameIndividual(:i0 o:i0)", 0, &[]);
 }
+
+#[test]
+fn settings_do_not_remove_facts_of_the_knowledge_base() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = |name: &str, text: &str| {
+        let path = directory.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        path.display().to_string()
+    };
+    let domain = file(
+        "domain.pddl",
+        "(define (domain d) (:requirements :adl :derived-predicates) (:predicates (done ?x))
+          (:action pass :parameters (?x) :precondition (and (inferred-Open ?x) (inferred-DockedAt ?x d1))
+            :effect (done ?x)))",
+    );
+    let problem = file(
+        "problem.pddl",
+        "(define (problem p) (:domain d) (:objects o1) (:init (Open d2)) (:goal (done door)))",
+    );
+    let knowledge = file(
+        "kb.ofn",
+        "Prefix(:=<http://e.org/k#>)\nOntology(<http://e.org/k>
+         Declaration(Class(:Open)) Declaration(ObjectProperty(:dockedAt)) Declaration(NamedIndividual(:door))
+         ClassAssertion(:Open :door) ObjectPropertyAssertion(:dockedAt :door :d1)
+         ObjectPropertyAssertion(:dockedAt :d2 :d2))",
+    );
+    for (setting, status, words) in [
+        ("Open door=false", 2, "the knowledge base states `(Open door)`"),
+        ("dockedAt door d1=false", 2, "the knowledge base states `(dockedAt door d1)`"),
+        ("dockedAt door=d2", 2, "the knowledge base states `(dockedAt door d1)`"),
+        ("dockedAt door=d1", 0, ""),
+        ("Open d2=false", 0, ""),
+        ("Open d1=true", 0, ""),
+    ] {
+        let (actual, _, stderr) =
+            metaplan(&["plan", &domain, &problem, "--kb", &knowledge, "--set", setting, "--quiet"]);
+        assert_eq!(actual, status, "{setting}: {stderr}");
+        assert!(stderr.contains(words), "{setting}: {stderr}");
+    }
+}

@@ -35,8 +35,8 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M116",
         "A name of the domain is reserved.",
-        "The plain domain declares a name that is needed for its completion with functions and designs.",
-        "Rename it in the domain.",
+        "The plain domain declares, or its problem uses, a name that is needed for the completion with functions and designs.",
+        "Rename it in the domain, or remove the facts from the problem.",
     ],
     [
         "M117",

@@ -28,7 +28,7 @@ use num_traits::Zero as _;
 use ontology::tomasys::{FunctionDesign, Individual, Quality, View};
 use pddl::ast::{
     Action, ActionBody, Arithmetic, Assignment, Condition, ConditionTime, Declaration, Domain, Effect,
-    EffectTime, Expression, Identifier, Name, Problem, Span, Term, TypeExpression, TypedName,
+    EffectTime, Expression, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
 };
 
 use crate::binding::{Bindings, add_values, atom, identifier, is_pddl_name};
@@ -117,6 +117,7 @@ impl CoAdaptation {
         let adaptation = Self { actions, chosen, changed };
         errors.extend(adaptation.errors(domain));
         errors.extend(adaptation.valued(problem));
+        errors.extend(adaptation.stated(problem));
         if errors.is_empty() { Ok(Some(adaptation)) } else { Err(errors.into()) }
     }
 
@@ -133,6 +134,23 @@ impl CoAdaptation {
             Message::error("M233", text)
         };
         valued.map(error).collect()
+    }
+
+    /// Returns errors for facts of the problem that state which designs meet a quality bound. The knowledge base decides.
+    fn stated(&self, problem: &Problem) -> Vec<Message> {
+        let predicates: BTreeSet<Name> = self.quality().into_iter().map(meets).collect();
+        let stated = problem.init.iter().filter_map(|element| match element {
+            InitialElement::Fact(atom) => Some(&atom.predicate.name),
+            _ => None,
+        });
+        let stated: BTreeSet<&Name> = stated.filter(|name| predicates.contains(*name)).collect();
+        let error = |name: &Name| {
+            let text = format!(
+                "the problem states facts of `{name}`, which co-adaptation adds to a plain domain; remove them"
+            );
+            Message::error("M116", text)
+        };
+        stated.into_iter().map(error).collect()
     }
 
     fn errors(&self, domain: &Domain) -> Vec<Message> {
@@ -259,7 +277,7 @@ impl CoAdaptation {
                 });
                 if (kept || !concerned) && is_pddl_name(&design.individual.name) {
                     let fact = atom(&meets(quality), &[&design.individual.name]);
-                    problem.init.push(pddl::ast::InitialElement::Fact(fact));
+                    problem.init.push(InitialElement::Fact(fact));
                 }
             }
         }
@@ -567,9 +585,9 @@ fn attributes(
 }
 
 fn has_value(problem: &Problem, function: &Name) -> bool {
-    problem.init.iter().any(|element| {
-        matches!(element, pddl::ast::InitialElement::Value(atom, _, _) if atom.predicate.name == *function)
-    })
+    problem.init.iter().any(
+        |element| matches!(element, InitialElement::Value(atom, _, _) if atom.predicate.name == *function),
+    )
 }
 
 fn estimated<'a>(designs: impl Iterator<Item = &'a FunctionDesign>) -> BTreeSet<String> {
