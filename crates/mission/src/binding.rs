@@ -6,6 +6,7 @@
 //! function to an estimated or measured attribute.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::fmt;
 
 use num_rational::BigRational;
 
@@ -16,7 +17,7 @@ use pddl::ast::{
     TypedName,
 };
 
-use crate::called::Names;
+use crate::called::{Names, Place};
 use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 use crate::visible::visible;
@@ -53,11 +54,21 @@ enum Query {
 }
 
 /// Bindings of PDDL symbols to queries on the knowledge base, and object names of individuals.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct Bindings {
     own: BTreeMap<Name, Query>,
     written: BTreeMap<String, String>,
     names: Names,
+    places: BTreeMap<String, Place>,
+}
+
+/// Omits the places, so that the text does not depend on where the bindings are written.
+impl fmt::Debug for Bindings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { own, written, names, places: _ } = self;
+        let mut fields = f.debug_struct("Bindings");
+        fields.field("own", own).field("written", written).field("names", names).finish()
+    }
 }
 
 impl Bindings {
@@ -77,7 +88,38 @@ impl Bindings {
         let parse =
             |(symbol, query): (&String, &String)| Ok((Name::new(symbol), parse_query(symbol, query)?));
         let (parsed, written) = (own.iter().map(parse).collect::<Result<_, String>>()?, own.clone());
-        Ok(Self { own: parsed, written, names: Names::default() })
+        Ok(Self { own: parsed, written, ..Self::default() })
+    }
+
+    /// Returns these bindings with the places of the explicit bindings, by PDDL symbol.
+    #[must_use]
+    pub fn placed(self, places: BTreeMap<String, Place>) -> Self {
+        Self { places, ..self }
+    }
+
+    /// Returns an error for each explicit binding whose query does not fit the declarations of its symbol. The default
+    /// binding of the symbol would be lost.
+    pub(super) fn misfits(&self, domain: &Domain) -> Vec<Message> {
+        let is_plain = !domain.types.iter().any(|declared| self.is_design(&declared.identifier.name));
+        let misfit = |(symbol, query): (&String, &String)| {
+            let name = Name::new(symbol);
+            let kinds = kinds(domain, &name);
+            let parsed = self.own.get(&name)?;
+            if kinds.is_empty() || kinds.iter().any(|kind| fits(parsed, *kind, is_plain)) {
+                return None;
+            }
+            let declared: Vec<String> = kinds.iter().map(ToString::to_string).collect();
+            let text = format!(
+                "`{symbol}` is bound to `{query}`, which is a query for {}, but it is {}; correct or remove the binding",
+                wanted(parsed),
+                declared.join(" and ")
+            );
+            Some(match self.places.get(symbol) {
+                Some((file, place)) => Message::at("M235", file, *place, text),
+                None => Message::error("M235", text),
+            })
+        };
+        self.written.iter().filter_map(misfit).collect()
     }
 
     /// Returns these bindings with the given object names of individuals.
@@ -204,6 +246,76 @@ impl Bindings {
             let name = name.as_str().to_owned();
             if declared.parameters.is_empty() { Query::Measured(name) } else { Query::Estimation(name) }
         })
+    }
+}
+
+/// A declaration of a symbol.
+#[derive(Clone, Copy)]
+enum Kind {
+    Type,
+    /// With the number of parameters.
+    Predicate(usize),
+    /// With the number of parameters.
+    Function(usize),
+    Action,
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = |count: &usize| if *count == 1 { "" } else { "s" };
+        match self {
+            Self::Type => f.write_str("a type"),
+            Self::Predicate(count) => write!(f, "a predicate with {count} parameter{}", plural(count)),
+            Self::Function(count) => write!(f, "a numeric function with {count} parameter{}", plural(count)),
+            Self::Action => f.write_str("an action"),
+        }
+    }
+}
+
+/// Returns the declarations of a symbol. Names of different kinds may be equal.
+fn kinds(domain: &Domain, name: &Name) -> Vec<Kind> {
+    let arity = |declared: &[Declaration]| {
+        let declared = declared.iter().find(|declared| declared.identifier.name == *name);
+        declared.map(|declared| declared.parameters.len())
+    };
+    let is_type = domain.types.iter().any(|declared| declared.identifier.name == *name);
+    let is_action = domain.actions.iter().any(|action| action.identifier.name == *name);
+    let kinds = [
+        is_type.then_some(Kind::Type),
+        arity(&domain.predicates).map(Kind::Predicate),
+        arity(&domain.functions).map(Kind::Function),
+        is_action.then_some(Kind::Action),
+    ];
+    kinds.into_iter().flatten().collect()
+}
+
+/// Returns `true` if a query can be bound to a symbol of this kind. `is_plain` states whether the domain is plain.
+fn fits(query: &Query, kind: Kind, is_plain: bool) -> bool {
+    match (query, kind) {
+        (Query::Class(_), Kind::Type)
+        | (Query::Solves, Kind::Predicate(2))
+        | (Query::Available, Kind::Predicate(1))
+        | (Query::Estimation(_), Kind::Function(1))
+        | (Query::Measured(_), Kind::Function(0))
+        | (Query::Action(_), Kind::Action) => true,
+        (Query::Requires(_), Kind::Predicate(count)) => count > 0,
+        (Query::Chosen(_) | Query::Reconfigured(_), Kind::Function(0)) => is_plain,
+        _ => false,
+    }
+}
+
+fn wanted(query: &Query) -> &'static str {
+    match query {
+        Query::Class(_) => "a type",
+        Query::Solves => "a predicate with 2 parameters, a design and a function",
+        Query::Available => "a predicate with 1 parameter, a design",
+        Query::Requires(_) => "a predicate with an action and its functions as parameters",
+        Query::Estimation(_) => "a numeric function with 1 parameter, a design",
+        Query::Measured(_) => "a numeric function with 0 parameters",
+        Query::Chosen(_) | Query::Reconfigured(_) => {
+            "a numeric function with 0 parameters in a domain without a type of designs"
+        }
+        Query::Action(_) => "an action",
     }
 }
 

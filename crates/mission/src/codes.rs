@@ -213,6 +213,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Remove all values but one.",
     ],
     [
+        "M235",
+        "A binding does not fit its symbol.",
+        "`[bindings]` binds a symbol to a query of another kind, for example a predicate with one parameter to `solves`.",
+        "Use a query that fits the symbol, or remove the binding, so that the default applies.",
+    ],
+    [
         "M310",
         "The adaptation loop does not support a part of the mission.",
         "A timed initial literal, or a constraint or preference over the whole trajectory, refers to the past of the mission.",

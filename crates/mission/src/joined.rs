@@ -99,6 +99,9 @@ impl Mission {
             warnings.extend(more);
             Some(planta)
         });
+        if knowledge.is_some() && planta.is_none() {
+            Errors::unless_empty(bindings.misfits(&domain))?;
+        }
         let (problem_designs, never_named) = match &mut knowledge {
             // PLANTA's form completes the domain with the names of the knowledge base, so no names
             // need to be aligned.
@@ -126,9 +129,7 @@ impl Mission {
             }
             (None, _) => Vec::new(),
         };
-        if !ambiguous.is_empty() {
-            return Err(ambiguous.into());
-        }
+        Errors::unless_empty(ambiguous)?;
         let name = name.to_owned();
         Ok(Self {
             name,
