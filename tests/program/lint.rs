@@ -110,6 +110,9 @@ fn bindings_fit_their_symbols() {
         ("fd_available = \"solves\"", 3),
         ("battery_usage = \"chosen:safety\"", 3),
         ("fd_available = \"available\"", 0),
+        // The class can be given by its name or IRI.
+        ("functiondesign = \"class:FunctionDesign\"", 0),
+        ("functiondesign = \"class:http://metacontrol.org/tomasys#FunctionDesign\"", 0),
     ] {
         let manifest = std::fs::read_to_string(explicit.path().join("missions/ugv.toml")).expect("text");
         let manifest = format!("{manifest}\n[bindings]\n{binding}\n");

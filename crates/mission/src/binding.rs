@@ -158,7 +158,7 @@ impl Bindings {
     }
 
     pub(super) fn is_design(&self, name: &Name) -> bool {
-        self.r#type(name) == Some(Query::Class("FunctionDesign".to_owned()))
+        self.class(name).is_some_and(|class| local_name(&class) == "FunctionDesign")
     }
 
     /// Returns `true` if the action schema `name` of a plain domain (without a type of designs) corresponds
