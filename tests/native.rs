@@ -481,3 +481,21 @@ fn problems_do_not_state_which_designs_meet_a_bound() {
     let messages = messages.map(|_| ()).expect_err("a fact of the knowledge base");
     assert!(messages.iter().any(|message| message.code == "M116"), "{messages:#?}");
 }
+
+#[test]
+fn same_individuals_count_once() {
+    for statements in [
+        ":h owl:sameAs :f .",
+        ":e owl:sameAs :f . :a_go t:requiresF :e .",
+        ":cost owl:sameAs :effort .",
+        ":a_walk owl:sameAs :a_go .",
+    ] {
+        let mission = with_statements(statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
+        let (status, cost, steps) = answer(&mission);
+        assert_eq!((status, cost.as_deref()), (Status::Optimal, Some("1")), "{statements}");
+        let designs: Vec<&str> = steps.iter().flatten().map(|(_, design)| design.as_str()).collect();
+        assert_eq!(designs, ["fd_a"], "{statements}");
+        let doubts = mission.doubts();
+        assert!(doubts.iter().all(|doubt| doubt.code != "M205"), "{statements}: {doubts:#?}");
+    }
+}

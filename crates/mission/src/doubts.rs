@@ -74,12 +74,17 @@ impl Mission {
         let schemas: Vec<&Name> = self.domain.actions.iter().map(|action| &action.identifier.name).collect();
         let predicates: Vec<&Name> =
             self.domain.predicates.iter().map(|predicate| &predicate.identifier.name).collect();
-        let actions = knowledge.view().actions().into_iter();
-        let relevant = actions.filter(|action| !action.requires.is_empty() || !action.quality.is_empty());
+        let view = knowledge.view();
+        let actions = view.actions();
+        let relevant =
+            actions.iter().filter(|action| !action.requires.is_empty() || !action.quality.is_empty());
         let mut doubts = Vec::new();
         for action in relevant {
             let name = &action.individual.name;
-            let has_schema = schemas.iter().any(|schema| self.bindings.is_action(schema, &action.individual));
+            let mut same =
+                actions.iter().filter(|other| view.are_same(&action.individual.iri, &other.individual.iri));
+            let has_schema = same
+                .any(|same| schemas.iter().any(|schema| self.bindings.is_action(schema, &same.individual)));
             if has_schema
                 || predicates.iter().any(|predicate| self.bindings.says_needs(predicate, &action.individual))
             {

@@ -108,7 +108,8 @@ pub struct Estimation {
 pub struct Action {
     /// The action.
     pub individual: Individual,
-    /// The functions that are required while the action runs.
+    /// The functions that are required while the action runs. Of functions that are stated to be the same, only the
+    /// first one.
     pub requires: Vec<Individual>,
     /// Bounds on estimated attributes of the designs that are selected for these functions.
     pub quality: Vec<Quality>,
@@ -216,14 +217,18 @@ impl<'a> View<'a> {
         self.members(terms::FUNCTION_DESIGN).into_iter().map(|design| self.function_design(design)).collect()
     }
 
-    /// Returns the estimated values of a design, given by IRI, sorted by the individuals that hold them.
+    /// Returns the estimated values of a design, given by IRI, sorted by the individuals that hold them. A value of
+    /// attribute types that are stated to be the same is returned for each of them.
     pub fn estimations(&self, design_iri: &str) -> Vec<Estimation> {
-        let estimation = |individual: Individual| {
-            let attribute = self.objects(&individual.iri, terms::IS_TYPE).into_iter().next()?.name;
-            let value = self.number(&individual.iri, terms::HAS_VALUE)?;
-            Some(Estimation { individual, attribute, value })
-        };
-        self.objects(design_iri, terms::HAS_ESTIMATION).into_iter().filter_map(estimation).collect()
+        let mut estimations = Vec::new();
+        for individual in self.objects(design_iri, terms::HAS_ESTIMATION) {
+            let Some(value) = self.number(&individual.iri, terms::HAS_VALUE) else { continue };
+            for attribute in self.objects(&individual.iri, terms::IS_TYPE) {
+                let (individual, attribute, value) = (individual.clone(), attribute.name, value.clone());
+                estimations.push(Estimation { individual, attribute, value });
+            }
+        }
+        estimations
     }
 
     /// Returns all components with their statuses, sorted by IRI.
@@ -257,7 +262,12 @@ impl<'a> View<'a> {
     /// Returns all actions with the functions that they require, sorted by IRI.
     pub fn actions(&self) -> Vec<Action> {
         let action = |individual: Individual| {
-            let requires = self.objects(&individual.iri, terms::REQUIRES_F);
+            let mut requires: Vec<Individual> = Vec::new();
+            for function in self.objects(&individual.iri, terms::REQUIRES_F) {
+                if !requires.iter().any(|first| self.are_same(&first.iri, &function.iri)) {
+                    requires.push(function);
+                }
+            }
             let quality = self.objects(&individual.iri, terms::REQUIRES_QUALITY).into_iter();
             let quality = quality.filter_map(|individual| {
                 let context = self.literals(&individual.iri, terms::IN_CONTEXT).into_iter().next();
