@@ -81,10 +81,10 @@ impl Mission {
         let mut doubts = Vec::new();
         for action in relevant {
             let name = &action.individual.name;
-            let mut same =
+            let mut names =
                 actions.iter().filter(|other| view.are_same(&action.individual.iri, &other.individual.iri));
-            let has_schema = same
-                .any(|same| schemas.iter().any(|schema| self.bindings.is_action(schema, &same.individual)));
+            let has_schema = names
+                .any(|other| schemas.iter().any(|schema| self.bindings.is_action(schema, &other.individual)));
             if has_schema
                 || predicates.iter().any(|predicate| self.bindings.says_needs(predicate, &action.individual))
             {

@@ -51,8 +51,9 @@ impl Mission {
     ///
     /// # Errors
     /// Errors of the knowledge base, unreadable files, files of another kind, and syntax errors of the domain and the
-    /// problem. Without such errors: errors of `[bindings.names]`, required functions without a common design,
-    /// errors of co-adaptation, different individuals with one name, and different values of one attribute. Symbols and types of PDDL are not checked; see [`Mission::filled`].
+    /// problem. Without such errors: errors of `[bindings]` and `[bindings.names]`, required functions without a common
+    /// design, errors of co-adaptation, different individuals with one name, and different values of one attribute.
+    /// Symbols and types of PDDL are not checked; see [`Mission::filled`].
     pub fn new(
         name: &str,
         knowledge: Option<Result<Knowledge, Errors>>,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use num_rational::BigRational;
 use ontology::ANONYMOUS;
-use ontology::tomasys::Individual;
+use ontology::tomasys::{Estimation, Individual, Measurement};
 use pddl::ast::Domain;
 
 use crate::binding::{self, Bindings};
@@ -28,63 +28,57 @@ pub(crate) fn several_values(
     for design in catalogue.designs() {
         let estimations = view.estimations(&design.individual.iri).into_iter();
         let used = estimations.filter(|estimation| attributes.contains(&estimation.attribute));
-        let values = used.map(|estimation| (estimation.attribute, (estimation.individual, estimation.value)));
+        let values =
+            used.map(|Estimation { individual, attribute, value }| Held { individual, attribute, value });
         let kind = format!("the design <{}> has two estimations", design.individual.iri);
-        errors
-            .extend(different(values).iter().map(|found| error(knowledge, &kind, &design.individual, found)));
+        for (first, second) in different(values) {
+            errors.push(error(knowledge, &kind, &design.individual, &first, &second));
+        }
     }
     let measurements = catalogue.measurements().iter();
     let used = measurements.filter(|measurement| attributes.contains(&measurement.attribute));
-    let values = used.filter_map(|measurement| {
-        let value = measurement.value.clone()?;
-        Some((measurement.attribute.clone(), (measurement.individual.clone(), value)))
+    let values = used.cloned().filter_map(|Measurement { individual, attribute, value }| {
+        Some(Held { individual, attribute, value: value? })
     });
-    for found in different(values) {
-        errors.push(error(knowledge, "there are two measured values", &found.second.0, &found));
+    for (first, second) in different(values) {
+        errors.push(error(knowledge, "there are two measured values", &second.individual, &first, &second));
     }
     errors
 }
 
-type Holder = (Individual, BigRational);
-
-/// Two different values of an attribute.
-struct Difference {
+/// A value of an attribute, and the individual that holds it.
+#[derive(Clone)]
+struct Held {
+    individual: Individual,
     attribute: String,
-    first: Holder,
-    second: Holder,
+    value: BigRational,
 }
 
-/// Returns the values that differ from the first value of their attribute, each with this first value.
-fn different(values: impl Iterator<Item = (String, Holder)>) -> Vec<Difference> {
-    let mut first_by_attribute: BTreeMap<String, Holder> = BTreeMap::new();
+/// Returns the values that differ from the first value of their attribute, each after this first value.
+fn different(values: impl Iterator<Item = Held>) -> Vec<(Held, Held)> {
+    let mut first_by_attribute: BTreeMap<String, Held> = BTreeMap::new();
     let mut differences = Vec::new();
-    for (attribute, second) in values {
-        match first_by_attribute.get(&attribute) {
-            Some(first) if first.1 != second.1 => {
-                differences.push(Difference { first: first.clone(), attribute, second });
-            }
+    for held in values {
+        match first_by_attribute.get(&held.attribute) {
+            Some(first) if first.value != held.value => differences.push((first.clone(), held)),
             Some(_) => {}
             None => {
-                first_by_attribute.insert(attribute, second);
+                first_by_attribute.insert(held.attribute.clone(), held);
             }
         }
     }
     differences
 }
 
-fn error(knowledge: &Knowledge, kind: &str, subject: &Individual, found: &Difference) -> Message {
-    let value = |(individual, value): &Holder| {
-        if individual.iri.starts_with(ANONYMOUS) {
-            value.to_string()
+fn error(knowledge: &Knowledge, kind: &str, subject: &Individual, first: &Held, second: &Held) -> Message {
+    let shown = |held: &Held| {
+        if held.individual.iri.starts_with(ANONYMOUS) {
+            held.value.to_string()
         } else {
-            format!("{value} (<{}>)", individual.iri)
+            format!("{} (<{}>)", held.value, held.individual.iri)
         }
     };
-    let text = format!(
-        "{kind} of `{}`, {} and {}; remove one of them",
-        found.attribute,
-        value(&found.first),
-        value(&found.second)
-    );
+    let (attribute, first, second) = (&first.attribute, shown(first), shown(second));
+    let text = format!("{kind} of `{attribute}`, {first} and {second}; remove one of them");
     doubt_about(knowledge, "M234", &subject.iri, text).into_error()
 }

@@ -101,11 +101,11 @@ impl Terms {
     /// Collects the constants: named individuals with their types, and values in assertions, except numbers.
     pub(super) fn types(&mut self, ontology: &Ontology) {
         let (mut kinds, mut spelled) = (BTreeMap::new(), BTreeMap::new());
-        let same = ontology.axioms.iter().filter_map(|annotated| match &annotated.axiom {
+        let same_individuals = ontology.axioms.iter().filter_map(|annotated| match &annotated.axiom {
             Axiom::SameIndividual(individuals) => Some(individuals.clone()),
             _ => None,
         });
-        self.same = same.collect();
+        self.same = same_individuals.collect();
         for annotated in &ontology.axioms {
             match &annotated.axiom {
                 Axiom::ObjectPropertyAssertion(ObjectPropertyExpression::Property(property), own, r#type)
