@@ -499,3 +499,13 @@ fn same_individuals_count_once() {
         assert!(doubts.iter().all(|doubt| doubt.code != "M205"), "{statements}: {doubts:#?}");
     }
 }
+
+#[test]
+fn a_measurement_does_not_change_an_estimation() {
+    let statements = ":fd_a t:hasRequirement [ a t:Requirement ; t:isQAtype :effort ; t:hasMaximum 9 ] .
+        :fd_b a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation :obs_effort .
+        :obs_effort a t:QAvalue ; t:isQAtype :effort ; t:hasValue 0 .";
+    let mut mission = with_statements(statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
+    mission.set("effort", "3").expect("an attribute with a bound");
+    assert_eq!(answer(&mission).1.as_deref(), Some("0"));
+}
