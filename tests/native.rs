@@ -290,15 +290,11 @@ const CONTEXT: &str = ":f a t:Function . :effort a t:QualityAttributeType . :lig
 
 fn check_small(knowledge: &str, domain: &str, bindings: &[(&str, &str)], cost: &str, designs: &[&str]) {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    // A fact of a derived predicate cannot be stated.
-    let fact = if domain.contains("(:derived (open) (door))") { "(door)" } else { "(open)" };
-    let problem = format!(
-        "(define (problem p) (:domain d) (:init (= (total-cost) 0) {fact}) (:goal (done))
-          (:metric minimize (total-cost)))"
-    );
+    let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0) (open)) (:goal (done))
+        (:metric minimize (total-cost)))";
     let bindings = bindings.iter().map(|(symbol, query)| ((*symbol).to_owned(), (*query).to_owned()));
     let knowledge = format!("{PREFIX}{knowledge}");
-    let mission = read(directory.path(), &knowledge, domain, &problem, &bindings.collect());
+    let mission = read(directory.path(), &knowledge, domain, problem, &bindings.collect());
     let (status, actual, steps) =
         answer(&mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}")));
     assert_eq!((status, actual.as_deref()), (Status::Optimal, Some(cost)), "{domain}");
@@ -326,16 +322,11 @@ fn a_change_to_a_design_without_an_estimation_is_free() {
 
 #[test]
 fn a_context_that_ends_at_the_start_of_an_action_counts() {
-    let domain = |ended: &str, axiom: &str| {
-        format!(
-            "(define (domain d) (:requirements :durative-actions :derived-predicates)
-              (:predicates (open) (door) (done)) (:functions (total-cost) (effort)) {axiom}
-              (:durative-action enter :parameters () :duration (= ?duration 1) :condition (at start ({ended}))
-                :effect (and (at start (not ({ended}))) (at end (done)) (at end (increase (total-cost) (effort))))))"
-        )
-    };
-    check_small(CONTEXT, &domain("open", ""), &[], "2", &["fd_b"]);
-    check_small(CONTEXT, &domain("door", "(:derived (open) (door))"), &[], "2", &["fd_b"]);
+    let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (open) (done))
+        (:functions (total-cost) (effort))
+        (:durative-action enter :parameters () :duration (= ?duration 1) :condition (at start (open))
+          :effect (and (at start (not (open))) (at end (done)) (at end (increase (total-cost) (effort))))))";
+    check_small(CONTEXT, domain, &[], "2", &["fd_b"]);
 }
 
 /// One function with one design. The statements of a test are added to these.
