@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
 use metaplan::message::Errors;
@@ -141,28 +141,36 @@ impl Generated {
     }
 
     fn mission(&self, domain: &str, directory: &Path) -> Mission {
-        let file = |name: &str, text: &str| -> PathBuf {
-            let path = directory.join(name);
-            std::fs::write(&path, text).expect("a file");
-            path
-        };
-        let sources = Sources {
-            documents: vec![file("kb.ttl", &self.knowledge)],
-            rules: vec![COADAPTATION.to_owned()],
-            options: ReadOptions::default(),
-            limits: StepLimits::default(),
-        };
         // The explicit form counts design changes by actions, so it needs no binding.
         let bindings = if domain == self.plain { self.bindings.clone() } else { BTreeMap::new() };
-        let mission: Result<Mission, Errors> = Mission::new(
-            "generated",
-            Some(Knowledge::read(&sources)),
-            Bindings::with(&bindings).expect("bindings"),
-            Ok(Source::new("domain", domain)),
-            Ok(Source::new("problem", self.problem.as_str())),
-        );
+        let mission = read(directory, &self.knowledge, domain, &self.problem, &bindings);
         mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}"))
     }
+}
+
+/// Reads a mission of texts. The knowledge base is written to a file in `directory`.
+fn read(
+    directory: &Path,
+    knowledge: &str,
+    domain: &str,
+    problem: &str,
+    bindings: &BTreeMap<String, String>,
+) -> Result<Mission, Errors> {
+    let file = directory.join("kb.ttl");
+    std::fs::write(&file, knowledge).expect("a file");
+    let sources = Sources {
+        documents: vec![file],
+        rules: vec![COADAPTATION.to_owned()],
+        options: ReadOptions::default(),
+        limits: StepLimits::default(),
+    };
+    Mission::new(
+        "generated",
+        Some(Knowledge::read(&sources)),
+        Bindings::with(bindings).expect("bindings"),
+        Ok(Source::new("domain", domain)),
+        Ok(Source::new("problem", problem)),
+    )
 }
 
 /// Returns the explicit form of the domain: actions with parameters for functions and designs. A change of
@@ -261,4 +269,234 @@ fn generated_missions_have_the_same_optimum_in_both_forms() {
     }
     // Guards against generated missions that are mostly unsolvable.
     assert!(solved[0] > 20 && solved[1] > 20, "{solved:?} missions have a plan");
+}
+
+/// Two actions: `first` requires a design without light, and `second` a design with light.
+const CHANGE: &str = ":f a t:Function . :start a t:QualityAttributeType . :light a t:QualityAttributeType .
+    :a_first a t:Action ; t:requiresF :f ; t:requiresQuality [ a t:Requirement ; t:isQAtype :light ; t:hasMaximum 0 ] .
+    :a_second a t:Action ; t:requiresF :f ; t:requiresQuality [ a t:Requirement ; t:isQAtype :light ; t:hasMinimum 1 ] .
+    :fd_lidar a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :start ; t:hasValue 4 ] ,
+      [ a t:QAvalue ; t:isQAtype :light ; t:hasValue 0 ] .
+    :fd_camera a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :light ; t:hasValue 1 ] .";
+
+/// A quality bound for the action `enter`, in a context that the predicate `(open ?a)` states.
+const CONTEXT: &str = ":f a t:Function . :effort a t:QualityAttributeType . :light a t:QualityAttributeType .
+    :a_enter a t:Action ; t:requiresF :f ; t:requiresQuality :r .
+    :r a t:Requirement ; t:isQAtype :light ; t:hasMinimum 1 ; t:inContext \"open\" .
+    :fd_a a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :effort ; t:hasValue 1 ] ,
+      [ a t:QAvalue ; t:isQAtype :light ; t:hasValue 0 ] .
+    :fd_b a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :effort ; t:hasValue 2 ] ,
+      [ a t:QAvalue ; t:isQAtype :light ; t:hasValue 1 ] .";
+
+fn check_small(knowledge: &str, domain: &str, bindings: &[(&str, &str)], cost: &str, designs: &[&str]) {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0) (open)) (:goal (done))
+        (:metric minimize (total-cost)))";
+    let bindings = bindings.iter().map(|(symbol, query)| ((*symbol).to_owned(), (*query).to_owned()));
+    let knowledge = format!("{PREFIX}{knowledge}");
+    let mission = read(directory.path(), &knowledge, domain, problem, &bindings.collect());
+    let (status, actual, steps) =
+        answer(&mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}")));
+    assert_eq!((status, actual.as_deref()), (Status::Optimal, Some(cost)), "{domain}");
+    let actual: Vec<&str> = steps.iter().flatten().map(|(_, design)| design.as_str()).collect();
+    assert_eq!(actual, designs, "{domain}");
+}
+
+#[test]
+fn a_change_to_a_design_without_an_estimation_is_free() {
+    let domain = |functions: &str, cost: &str| {
+        format!(
+            "(define (domain d) (:predicates (open) (one) (done)) (:functions (total-cost) {functions})
+              (:action first :parameters () :precondition (open)
+                :effect (and (one) (increase (total-cost) (+ 1 {cost})) (increase (total-cost) (change))))
+              (:action second :parameters () :precondition (one)
+                :effect (and (done) (increase (total-cost) 1) (increase (total-cost) (change)))))"
+        )
+    };
+    let bindings = [("change", "reconfigured:start"), ("used", "chosen:start")];
+    check_small(CHANGE, &domain("(change)", "0"), &bindings[..1], "2", &["fd_lidar", "fd_camera"]);
+    // The chosen design of `first` costs 4. A sum over chosen designs is undefined without an estimation, so it has
+    // another function than the sum over newly chosen designs.
+    check_small(CHANGE, &domain("(change) (used)", "(used)"), &bindings, "6", &["fd_lidar", "fd_camera"]);
+}
+
+#[test]
+fn a_context_that_ends_at_the_start_of_an_action_counts() {
+    let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (open) (done))
+        (:functions (total-cost) (effort))
+        (:durative-action enter :parameters () :duration (= ?duration 1) :condition (at start (open))
+          :effect (and (at start (not (open))) (at end (done)) (at end (increase (total-cost) (effort))))))";
+    check_small(CONTEXT, domain, &[], "2", &["fd_b"]);
+}
+
+/// One function with one design. The statements of a test are added to these.
+const ONE_DESIGN: &str = "@prefix o: <urn:o#> . :f a t:Function . :effort a t:QualityAttributeType .
+    :a_go a t:Action ; t:requiresF :f .
+    :fd_a a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :effort ; t:hasValue 1 ] .\n";
+
+fn with_statements(statements: &str) -> Result<Mission, Errors> {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let domain = "(define (domain d) (:predicates (done)) (:functions (total-cost) (effort))
+        (:action go :parameters () :precondition () :effect (and (done) (increase (total-cost) (effort)))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0)) (:goal (done))
+        (:metric minimize (total-cost)))";
+    let knowledge = format!("{PREFIX}{ONE_DESIGN}{statements}");
+    read(directory.path(), &knowledge, domain, problem, &BTreeMap::new())
+}
+
+#[test]
+fn individuals_with_one_name_in_pddl_are_refused() {
+    let bound = "a t:Requirement ; t:isQAtype :effort ; t:hasMaximum";
+    for (statements, first, second) in [
+        ("o:fd_a a t:FunctionDesign ; t:solvesF :f .", "<urn:m#fd_a>", "<urn:o#fd_a>"),
+        (":FD_A a t:FunctionDesign ; t:solvesF :f .", "<urn:m#FD_A>", "<urn:m#fd_a>"),
+        ("o:f a t:Function . :fd_b a t:FunctionDesign ; t:solvesF o:f .", "<urn:m#f>", "<urn:o#f>"),
+        (
+            "o:fd_a a t:Function . :fd_b a t:FunctionDesign ; t:solvesF o:fd_a .",
+            "<urn:m#fd_a>",
+            "<urn:o#fd_a>",
+        ),
+        (
+            format!(":a_go t:requiresQuality :q , o:q . :q {bound} 1 . o:q {bound} 2 .").as_str(),
+            "<urn:m#q>",
+            "<urn:o#q>",
+        ),
+        (
+            "o:effort a t:QualityAttributeType . [] a t:QAvalue ; t:isQAtype o:effort ; t:hasValue 2 .",
+            "<urn:m#effort>",
+            "<urn:o#effort>",
+        ),
+        (":go a t:Action ; t:requiresF :f .", "<urn:m#a_go>", "<urn:m#go>"),
+    ] {
+        let messages = with_statements(statements).map(|_| ()).expect_err(statements);
+        let messages: Vec<_> = messages.iter().collect();
+        let [message] = messages[..] else { panic!("{statements}: {messages:#?}") };
+        assert_eq!(message.code, "M225", "{statements}: {messages:#?}");
+        for iri in [first, second] {
+            assert!(message.message.contains(iri), "{statements}: no {iri}: {messages:#?}");
+        }
+    }
+}
+
+#[test]
+fn equal_names_outside_of_the_problem_are_accepted() {
+    for statements in [
+        "o:fd_a a t:Component .",
+        "o:fd_a a t:QualityAttributeType .",
+        "o:effort a t:QualityAttributeType .",
+        "o:a_go a t:Action .",
+        ":Effort a t:Component .",
+    ] {
+        let mission = with_statements(statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
+        assert_eq!(answer(&mission).1.as_deref(), Some("1"), "{statements}");
+    }
+}
+
+#[test]
+fn different_values_of_one_attribute_are_refused() {
+    let estimation = |kind: &str, value: &str| {
+        format!(
+            ":fd_a t:hasQAestimation :v{value} . :v{value} a t:QAvalue ; t:isQAtype {kind} ; t:hasValue {value} ."
+        )
+    };
+    let measured = |value: &str| {
+        format!(":w{value} a t:QAvalue ; t:isQAtype :effort ; t:isMeasured true ; t:hasValue {value} .")
+    };
+    let twice = |part: &dyn Fn(&str) -> String| format!("{}\n{}", part("2"), part("7"));
+    for (statements, words) in [
+        (estimation(":effort", "7"), ["<urn:m#fd_a> has two estimations of `effort`", "7 (<urn:m#v7>)"]),
+        (twice(&measured), ["2 (<urn:m#w2>)", "7 (<urn:m#w7>)"]),
+    ] {
+        let messages = with_statements(&statements).map(|_| ()).expect_err(&statements);
+        let messages: Vec<_> = messages.iter().collect();
+        let [message] = messages[..] else { panic!("{statements}: {messages:#?}") };
+        assert_eq!(message.code, "M234", "{statements}: {messages:#?}");
+        for word in words {
+            assert!(message.message.contains(word), "{statements}: no `{word}`: {messages:#?}");
+        }
+    }
+    // Equal values, and values that the problem does not use.
+    for statements in [estimation(":effort", "1"), twice(&|value| estimation(":beauty", value))] {
+        let mission = with_statements(&statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
+        assert_eq!(answer(&mission).1.as_deref(), Some("1"), "{statements}");
+    }
+}
+
+#[test]
+fn values_with_the_prefix_of_measurements_can_be_estimations() {
+    let value = "a t:QAvalue ; t:isQAtype :effort ; t:hasValue 5";
+    let design = ":fd_b a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation :obs_b .";
+    for (statements, cost) in [
+        (format!("{design} :obs_b {value} ; t:isMeasured false ."), "1"),
+        (format!("{design} :obs_b {value} ."), "1"),
+        (format!(":obs_b {value} ; t:isMeasured false ."), "1"),
+        // A measured value replaces the estimations of all designs.
+        (format!(":obs_b {value} ."), "5"),
+        (format!(":qa_b {value} ; t:isMeasured true ."), "5"),
+    ] {
+        let mission = with_statements(&statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
+        assert_eq!(answer(&mission).1.as_deref(), Some(cost), "{statements}");
+    }
+}
+
+#[test]
+fn settings_do_not_contradict_the_knowledge_base() {
+    let bounded = ":a_go t:requiresQuality :q . :q a t:Requirement ; t:isQAtype :effort ; t:hasMaximum 2 .";
+    let bounded = || with_statements(bounded).expect("a mission");
+    let explicit = || shipped("ugv", &|_| {});
+    for (mut mission, name, value, is_accepted) in [
+        (bounded(), "fd_meets_q fd_a", "false", false),
+        (bounded(), "fd_meets_q fd_a", "true", false),
+        (bounded(), "done", "true", true),
+        (explicit(), "fd_solve_f fd_amcl_kinect f_localization", "false", false),
+        (explicit(), "fd_solve_f fd_amcl_kinect", "f_navigation", false),
+        (explicit(), "fd_solve_f fd_amcl_kinect f_localization", "true", true),
+        (explicit(), "robot_at", "wp2", true),
+    ] {
+        let outcome = mission.set(name, value);
+        assert_eq!(outcome.is_ok(), is_accepted, "{name}={value}: {outcome:?}");
+        assert!(outcome.err().is_none_or(|message| message.code == "M106"), "{name}={value}");
+    }
+}
+
+#[test]
+fn problems_do_not_state_which_designs_meet_a_bound() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let knowledge = format!(
+        "{PREFIX}{ONE_DESIGN}:a_go t:requiresQuality :q . :q a t:Requirement ; t:isQAtype :effort ; t:hasMaximum 0 ."
+    );
+    let domain = "(define (domain d) (:predicates (done))
+        (:action go :parameters () :precondition () :effect (done)))";
+    let problem = "(define (problem p) (:domain d) (:init (fd_meets_q fd_a)) (:goal (done)))";
+    let messages = read(directory.path(), &knowledge, domain, problem, &BTreeMap::new());
+    let messages = messages.map(|_| ()).expect_err("a fact of the knowledge base");
+    assert!(messages.iter().any(|message| message.code == "M116"), "{messages:#?}");
+}
+
+#[test]
+fn same_individuals_count_once() {
+    for statements in [
+        ":h owl:sameAs :f .",
+        ":e owl:sameAs :f . :a_go t:requiresF :e .",
+        ":cost owl:sameAs :effort .",
+        ":a_walk owl:sameAs :a_go .",
+    ] {
+        let mission = with_statements(statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
+        let (status, cost, steps) = answer(&mission);
+        assert_eq!((status, cost.as_deref()), (Status::Optimal, Some("1")), "{statements}");
+        let designs: Vec<&str> = steps.iter().flatten().map(|(_, design)| design.as_str()).collect();
+        assert_eq!(designs, ["fd_a"], "{statements}");
+        let doubts = mission.doubts();
+        assert!(doubts.iter().all(|doubt| doubt.code != "M205"), "{statements}: {doubts:#?}");
+    }
+}
+
+#[test]
+fn a_measurement_does_not_change_an_estimation() {
+    let statements = ":fd_a t:hasRequirement [ a t:Requirement ; t:isQAtype :effort ; t:hasMaximum 9 ] .
+        :fd_b a t:FunctionDesign ; t:solvesF :f ; t:hasQAestimation :obs_effort .
+        :obs_effort a t:QAvalue ; t:isQAtype :effort ; t:hasValue 0 .";
+    let mut mission = with_statements(statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
+    mission.set("effort", "3").expect("an attribute with a bound");
+    assert_eq!(answer(&mission).1.as_deref(), Some("0"));
 }

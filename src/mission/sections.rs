@@ -136,8 +136,11 @@ impl BindingsSection {
         };
         let wrong: Vec<Message> = self.symbols.iter().filter_map(error_of).collect();
         let symbols = self.symbols.iter().map(|(symbol, query)| (symbol.clone(), query.get_ref().clone()));
+        let places = self.symbols.iter().map(|(symbol, query)| {
+            (symbol.clone(), (origin.file().to_owned(), Some(origin.place(query.span().start))))
+        });
         match Bindings::with(&symbols.collect()) {
-            Ok(bindings) if wrong.is_empty() => Ok(bindings.naming(names)),
+            Ok(bindings) if wrong.is_empty() => Ok(bindings.naming(names).placed(places.collect())),
             _ => Err(wrong.into()),
         }
     }

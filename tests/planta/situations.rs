@@ -283,3 +283,87 @@ fn all_maps_of_the_study_are_planned_optimally() {
         }
     }
 }
+
+/// Different individuals, classes and values of a knowledge base must not become one object or predicate.
+#[test]
+fn names_that_are_equal_in_pddl_are_refused() {
+    let domain = "(define (domain d) (:requirements :adl :derived-predicates) (:predicates (done ?x))
+        (:action a :parameters (?x) :precondition (and (inferred-Ca ?x) (inferred-Cb ?x)) :effect (done ?x)))";
+    let problem = "(define (problem p) (:domain d) (:objects o1) (:init) (:goal (done i0)))";
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = |name: &str, text: &str| {
+        let path = directory.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        path.display().to_string()
+    };
+    let (domain, problem) = (file("domain.pddl", domain), file("problem.pddl", problem));
+    let check = |axioms: &str, status: i32, words: &[&str]| {
+        let text = format!(
+            "Prefix(:=<http://e.org/k#>)\nPrefix(o:=<http://o.org/k#>)\nOntology(<http://e.org/k>
+             Declaration(Class(:Ca)) Declaration(Class(:Cb)) Declaration(DataProperty(:pd))
+             Declaration(NamedIndividual(:i0)) ClassAssertion(:Ca :i0) {axioms})"
+        );
+        let knowledge = file("kb.ofn", &text);
+        let (actual, _, stderr) = metaplan(&["plan", &domain, &problem, "--kb", &knowledge, "--quiet"]);
+        assert_eq!(actual, status, "{axioms}: {stderr}");
+        for word in words {
+            assert!(stderr.contains(word), "{axioms}: no `{word}`: {stderr}");
+        }
+    };
+    check("ClassAssertion(:Cb :i0)", 0, &[]);
+    check("ClassAssertion(:Cb :I0)", 3, &["M225", "<http://e.org/k#i0>", "<http://e.org/k#I0>"]);
+    check("ClassAssertion(:Cb o:i0)", 3, &["M225", "<http://e.org/k#i0>", "<http://o.org/k#i0>"]);
+    check(
+        "Declaration(Class(o:Cb)) ClassAssertion(o:Cb :i0)",
+        3,
+        &["M225", "<http://e.org/k#Cb>", "<http://o.org/k#Cb>"],
+    );
+    check(
+        "DataPropertyAssertion(:pd :i0 \"hello world\") DataPropertyAssertion(:pd :i0 \"hello_world\")",
+        3,
+        &["M225", "\"hello world\"", "\"hello_world\""],
+    );
+    // An individual and a class may have one name, because objects and predicates are different in PDDL.
+    check("ClassAssertion(:Cb :i0) ClassAssertion(:Cb :ca)", 0, &[]);
+    check("ClassAssertion(:Cb :i0) ClassAssertion(:Cb o:i0) SameIndividual(:i0 o:i0)", 0, &[]);
+}
+
+#[test]
+fn settings_do_not_remove_facts_of_the_knowledge_base() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = |name: &str, text: &str| {
+        let path = directory.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        path.display().to_string()
+    };
+    let domain = file(
+        "domain.pddl",
+        "(define (domain d) (:requirements :adl :derived-predicates) (:predicates (done ?x))
+          (:action pass :parameters (?x) :precondition (and (inferred-Open ?x) (inferred-DockedAt ?x d1))
+            :effect (done ?x)))",
+    );
+    let problem = file(
+        "problem.pddl",
+        "(define (problem p) (:domain d) (:objects o1) (:init (Open d2)) (:goal (done door)))",
+    );
+    let knowledge = file(
+        "kb.ofn",
+        "Prefix(:=<http://e.org/k#>)\nOntology(<http://e.org/k>
+         Declaration(Class(:Open)) Declaration(ObjectProperty(:dockedAt)) Declaration(NamedIndividual(:door))
+         ClassAssertion(:Open :door) ObjectPropertyAssertion(:dockedAt :door :d1)
+         ObjectPropertyAssertion(:dockedAt :d2 :d2))",
+    );
+    for (setting, status, words) in [
+        ("Open door=false", 2, "the knowledge base states `(Open door)`"),
+        ("dockedAt door d1=false", 2, "the knowledge base states `(dockedAt door d1)`"),
+        ("dockedAt door=d2", 2, "the knowledge base states `(dockedAt door d1)`"),
+        ("dockedAt door=d1", 0, ""),
+        ("Open d2=false", 0, ""),
+        ("Open d1=true", 0, ""),
+    ] {
+        let (actual, _, stderr) =
+            metaplan(&["plan", &domain, &problem, "--kb", &knowledge, "--set", setting, "--quiet"]);
+        assert_eq!(actual, status, "{setting}: {stderr}");
+        assert!(stderr.contains(words), "{setting}: {stderr}");
+    }
+}

@@ -92,6 +92,38 @@ fn unused_names_are_warnings() {
 }
 
 #[test]
+fn bindings_fit_their_symbols() {
+    let bound = |binding: &str, words: &[&str]| {
+        let section = format!("[bindings]\n{binding}\n\n[report]");
+        check(
+            &[("mission.toml", "[report]", &section)],
+            3,
+            &[&["M235", "mission.toml:"][..], words].concat(),
+        );
+    };
+    bound("grasp_time = \"estimation:grasp_time\"", &["a numeric function with 1 parameter, a design"]);
+    bound("battery = \"class:Component\"", &["`battery` is bound to `class:Component`", "for a type"]);
+    bound("robot_at = \"solves\"", &["it is a predicate with 1 parameter;"]);
+    bound("move = \"available\"", &["it is an action"]);
+    let explicit = crate::common::copy_of_mission("ugv");
+    for (binding, status) in [
+        ("fd_available = \"solves\"", 3),
+        ("battery_usage = \"chosen:safety\"", 3),
+        ("fd_available = \"available\"", 0),
+        // The class can be given by its name or IRI.
+        ("functiondesign = \"class:FunctionDesign\"", 0),
+        ("functiondesign = \"class:http://metacontrol.org/tomasys#FunctionDesign\"", 0),
+    ] {
+        let manifest = std::fs::read_to_string(explicit.path().join("missions/ugv.toml")).expect("text");
+        let manifest = format!("{manifest}\n[bindings]\n{binding}\n");
+        std::fs::write(explicit.path().join("missions/bound.toml"), manifest).expect("written");
+        let outcome = metaplan_in(explicit.path(), &["lint", "missions/bound.toml"], "");
+        assert_eq!(outcome.status, status, "{binding}: {outcome:#?}");
+        assert_eq!(outcome.stdout.contains("M235"), status == 3, "{binding}: {outcome:#?}");
+    }
+}
+
+#[test]
 fn functions_of_positions_exist() {
     let positions = |names: &str| {
         let written = format!("positions = {names}");

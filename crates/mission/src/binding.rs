@@ -6,17 +6,18 @@
 //! function to an estimated or measured attribute.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::fmt;
 
 use num_rational::BigRational;
 
-use ontology::tomasys::{Individual, View};
+use ontology::tomasys::{Action, FunctionDesign, Individual, View};
 use ontology::vocab::local_name;
 use pddl::ast::{
     Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
     TypedName,
 };
 
-use crate::called::Names;
+use crate::called::{Names, Place};
 use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 use crate::visible::visible;
@@ -53,11 +54,21 @@ enum Query {
 }
 
 /// Bindings of PDDL symbols to queries on the knowledge base, and object names of individuals.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct Bindings {
     own: BTreeMap<Name, Query>,
     written: BTreeMap<String, String>,
     names: Names,
+    places: BTreeMap<String, Place>,
+}
+
+/// Omits the places, so that the text does not depend on where the bindings are written.
+impl fmt::Debug for Bindings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { own, written, names, places: _ } = self;
+        let mut fields = f.debug_struct("Bindings");
+        fields.field("own", own).field("written", written).field("names", names).finish()
+    }
 }
 
 impl Bindings {
@@ -77,7 +88,38 @@ impl Bindings {
         let parse =
             |(symbol, query): (&String, &String)| Ok((Name::new(symbol), parse_query(symbol, query)?));
         let (parsed, written) = (own.iter().map(parse).collect::<Result<_, String>>()?, own.clone());
-        Ok(Self { own: parsed, written, names: Names::default() })
+        Ok(Self { own: parsed, written, ..Self::default() })
+    }
+
+    /// Returns these bindings with the places of the explicit bindings, by PDDL symbol.
+    #[must_use]
+    pub fn placed(self, places: BTreeMap<String, Place>) -> Self {
+        Self { places, ..self }
+    }
+
+    /// Returns an error for each explicit binding whose query does not fit the declarations of its symbol. The default
+    /// binding of the symbol would be lost.
+    pub(super) fn misfits(&self, domain: &Domain) -> Vec<Message> {
+        let is_plain = !domain.types.iter().any(|declared| self.is_design(&declared.identifier.name));
+        let misfit = |(symbol, query): (&String, &String)| {
+            let name = Name::new(symbol);
+            let kinds = kinds(domain, &name);
+            let parsed = self.own.get(&name)?;
+            if kinds.is_empty() || kinds.iter().any(|kind| fits(parsed, *kind, is_plain)) {
+                return None;
+            }
+            let declared: Vec<String> = kinds.iter().map(ToString::to_string).collect();
+            let text = format!(
+                "`{symbol}` is bound to `{query}`, which is a query for {}, but it is {}; correct or remove the binding",
+                wanted(parsed),
+                declared.join(" and ")
+            );
+            Some(match self.places.get(symbol) {
+                Some((file, place)) => Message::at("M235", file, *place, text),
+                None => Message::error("M235", text),
+            })
+        };
+        self.written.iter().filter_map(misfit).collect()
     }
 
     /// Returns these bindings with the given object names of individuals.
@@ -116,16 +158,16 @@ impl Bindings {
     }
 
     pub(super) fn is_design(&self, name: &Name) -> bool {
-        self.r#type(name) == Some(Query::Class("FunctionDesign".to_owned()))
+        self.class(name).is_some_and(|class| local_name(&class) == "FunctionDesign")
     }
 
     /// Returns `true` if the action schema `name` of a plain domain (without a type of designs) corresponds
     /// to the action `known` of the knowledge base. Without an explicit binding, the names must agree, except
     /// that the action may have the prefix `a_`.
     pub(super) fn is_action(&self, name: &Name, known: &Individual) -> bool {
-        both(known).iter().any(|known| match self.own.get(name) {
-            Some(Query::Action(own)) => own == known,
-            _ => Name::new(known) == *name || Name::new(known) == Name::new(&format!("a_{name}")),
+        both(known).iter().any(|local| match self.own.get(name) {
+            Some(Query::Action(own)) => own == local || *own == known.iri,
+            _ => Name::new(local) == *name || Name::new(local) == Name::new(&format!("a_{name}")),
         })
     }
 
@@ -159,6 +201,11 @@ impl Bindings {
     /// Returns `true` if a predicate is bound to the availability of designs.
     pub fn is_availability(&self, predicate: &Name) -> bool {
         self.predicate(predicate) == Some(Query::Available)
+    }
+
+    /// Returns `true` if a predicate is bound to a query, so that the knowledge base adds its facts.
+    pub(super) fn is_bound_predicate(&self, predicate: &Name) -> bool {
+        self.predicate(predicate).is_some()
     }
 
     pub(super) fn is_measured(&self, declared: &Declaration, attribute: &str) -> bool {
@@ -199,6 +246,76 @@ impl Bindings {
             let name = name.as_str().to_owned();
             if declared.parameters.is_empty() { Query::Measured(name) } else { Query::Estimation(name) }
         })
+    }
+}
+
+/// A declaration of a symbol.
+#[derive(Clone, Copy)]
+enum Kind {
+    Type,
+    /// With the number of parameters.
+    Predicate(usize),
+    /// With the number of parameters.
+    Function(usize),
+    Action,
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = |count: &usize| if *count == 1 { "" } else { "s" };
+        match self {
+            Self::Type => f.write_str("a type"),
+            Self::Predicate(count) => write!(f, "a predicate with {count} parameter{}", plural(count)),
+            Self::Function(count) => write!(f, "a numeric function with {count} parameter{}", plural(count)),
+            Self::Action => f.write_str("an action"),
+        }
+    }
+}
+
+/// Returns the declarations of a symbol. Names of different kinds may be equal.
+fn kinds(domain: &Domain, name: &Name) -> Vec<Kind> {
+    let arity = |declared: &[Declaration]| {
+        let declared = declared.iter().find(|declared| declared.identifier.name == *name);
+        declared.map(|declared| declared.parameters.len())
+    };
+    let is_type = domain.types.iter().any(|declared| declared.identifier.name == *name);
+    let is_action = domain.actions.iter().any(|action| action.identifier.name == *name);
+    let kinds = [
+        is_type.then_some(Kind::Type),
+        arity(&domain.predicates).map(Kind::Predicate),
+        arity(&domain.functions).map(Kind::Function),
+        is_action.then_some(Kind::Action),
+    ];
+    kinds.into_iter().flatten().collect()
+}
+
+/// Returns `true` if a query can be bound to a symbol of this kind. `is_plain` states whether the domain is plain.
+fn fits(query: &Query, kind: Kind, is_plain: bool) -> bool {
+    match (query, kind) {
+        (Query::Class(_), Kind::Type)
+        | (Query::Solves, Kind::Predicate(2))
+        | (Query::Available, Kind::Predicate(1))
+        | (Query::Estimation(_), Kind::Function(1))
+        | (Query::Measured(_), Kind::Function(0))
+        | (Query::Action(_), Kind::Action) => true,
+        (Query::Requires(_), Kind::Predicate(count)) => count > 0,
+        (Query::Chosen(_) | Query::Reconfigured(_), Kind::Function(0)) => is_plain,
+        _ => false,
+    }
+}
+
+fn wanted(query: &Query) -> &'static str {
+    match query {
+        Query::Class(_) => "a type",
+        Query::Solves => "a predicate with 2 parameters, a design and a function",
+        Query::Available => "a predicate with 1 parameter, a design",
+        Query::Requires(_) => "a predicate with an action and its functions as parameters",
+        Query::Estimation(_) => "a numeric function with 1 parameter, a design",
+        Query::Measured(_) => "a numeric function with 0 parameters",
+        Query::Chosen(_) | Query::Reconfigured(_) => {
+            "a numeric function with 0 parameters in a domain without a type of designs"
+        }
+        Query::Action(_) => "an action",
     }
 }
 
@@ -275,6 +392,78 @@ pub(super) fn fill(
         fill.values(declared, &bindings.function(declared));
     }
     fill.warnings
+}
+
+/// Returns the individuals that [`fill`] uses as objects of a problem.
+pub(super) fn individuals(
+    domain: &Domain,
+    knowledge: &Knowledge,
+    bindings: &Bindings,
+) -> BTreeSet<Individual> {
+    let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
+    let mut individuals = BTreeSet::new();
+    for declared in &domain.types {
+        if let Some(class) = bindings.class(&declared.identifier.name) {
+            individuals.extend(catalogue.members(&view, &class).iter().cloned());
+        }
+    }
+    let designs = || catalogue.designs().iter();
+    for declared in &domain.predicates {
+        match bindings.predicate(&declared.identifier.name) {
+            Some(Query::Solves) if declared.parameters.len() == 2 => {
+                individuals.extend(designs().map(|design| design.individual.clone()));
+                individuals.extend(designs().flat_map(|design| design.solves.iter().cloned()));
+            }
+            Some(Query::Available) if declared.parameters.len() == 1 => {
+                individuals.extend(designs().map(|design| design.individual.clone()));
+            }
+            Some(Query::Requires(only)) => {
+                let actions = catalogue.actions().iter();
+                let fits = |action: &&Action| {
+                    is_only(action, only.as_deref()) && action.requires.len() + 1 == declared.parameters.len()
+                };
+                for action in actions.filter(fits) {
+                    individuals.insert(action.individual.clone());
+                    individuals.extend(action.requires.iter().cloned());
+                }
+            }
+            _ => {}
+        }
+    }
+    for declared in domain.functions.iter().filter(|declared| declared.parameters.len() == 1) {
+        if let Query::Estimation(attribute) = bindings.function(declared) {
+            let is_estimated = |design: &&FunctionDesign| estimation(design, &attribute).is_some();
+            individuals.extend(designs().filter(is_estimated).map(|design| design.individual.clone()));
+        }
+    }
+    individuals.retain(|individual| is_pddl_name(&individual.name));
+    individuals
+}
+
+/// Returns the names of the attributes whose estimations or measurements are values of the functions of a domain.
+pub(super) fn attributes(domain: &Domain, bindings: &Bindings) -> BTreeSet<String> {
+    let queries = domain.functions.iter().map(|declared| (declared, bindings.function(declared)));
+    let attributes = queries.filter_map(|(declared, query)| match query {
+        Query::Estimation(attribute) if declared.parameters.len() == 1 => Some(attribute),
+        Query::Measured(attribute) if declared.parameters.is_empty() => Some(attribute),
+        _ => None,
+    });
+    attributes.flat_map(|attribute| [plain(&attribute).to_owned(), attribute]).collect()
+}
+
+/// Returns `true` if the action has the name `only`, or if there is no such name.
+fn is_only(action: &Action, only: Option<&str>) -> bool {
+    only.is_none_or(|only| both(&action.individual).iter().any(|own| only.eq_ignore_ascii_case(own)))
+}
+
+/// Returns the estimation of a design for the attribute to which a function is bound, whose name may have the prefix
+/// `fd_`.
+fn estimation<'d>(design: &'d FunctionDesign, attribute: &str) -> Option<&'d BigRational> {
+    design.estimations.get(attribute).or_else(|| design.estimations.get(plain(attribute)))
+}
+
+fn plain(attribute: &str) -> &str {
+    attribute.strip_prefix("fd_").unwrap_or(attribute)
 }
 
 struct Fill<'a> {
@@ -365,9 +554,7 @@ impl Fill<'_> {
     fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
         let stated = self.stated(&declared.identifier.name);
         for action in self.known.actions() {
-            let named =
-                |only: &str| both(&action.individual).iter().any(|own| only.eq_ignore_ascii_case(own));
-            if only.is_some_and(|only| !named(only)) {
+            if !is_only(action, only) {
                 continue;
             }
             let functions: Vec<&str> =
@@ -400,9 +587,8 @@ impl Fill<'_> {
         let mut values: Vec<(Vec<String>, BigRational)> = Vec::new();
         match query {
             Query::Estimation(attribute) if declared.parameters.len() == 1 => {
-                let plain = attribute.strip_prefix("fd_").unwrap_or(attribute);
                 for design in self.known.designs() {
-                    let value = design.estimations.get(attribute).or_else(|| design.estimations.get(plain));
+                    let value = estimation(design, attribute);
                     values.extend(value.map(|value| (vec![design.individual.name.clone()], value.clone())));
                 }
             }
@@ -412,20 +598,26 @@ impl Fill<'_> {
             }
             _ => {}
         }
-        if values.is_empty() {
-            return;
-        }
-        let arguments_of = |element: &InitialElement| match element {
-            InitialElement::Value(atom, _, _) if atom.predicate.name == *name => Some(names(&atom.arguments)),
-            _ => None,
-        };
-        let stated: HashSet<Vec<Name>> = self.problem.init.iter().filter_map(arguments_of).collect();
-        for (arguments, value) in values {
-            let key: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
-            if !stated.contains(&key) && arguments.iter().all(|argument| is_pddl_name(argument)) {
-                let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-                self.problem.init.push(InitialElement::Value(atom(name, &arguments), value, Span::default()));
-            }
+        add_values(self.problem, name, values);
+    }
+}
+
+/// Adds values of a numeric function to a problem, except for arguments for which the problem states a value and
+/// arguments that are not PDDL names.
+pub(super) fn add_values(problem: &mut Problem, function: &Name, values: Vec<(Vec<String>, BigRational)>) {
+    if values.is_empty() {
+        return;
+    }
+    let arguments_of = |element: &InitialElement| match element {
+        InitialElement::Value(atom, _, _) if atom.predicate.name == *function => Some(names(&atom.arguments)),
+        _ => None,
+    };
+    let stated: HashSet<Vec<Name>> = problem.init.iter().filter_map(arguments_of).collect();
+    for (arguments, value) in values {
+        let key: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
+        if !stated.contains(&key) && arguments.iter().all(|argument| is_pddl_name(argument)) {
+            let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+            problem.init.push(InitialElement::Value(atom(function, &arguments), value, Span::default()));
         }
     }
 }

@@ -35,8 +35,8 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M116",
         "A name of the domain is reserved.",
-        "The plain domain declares a name that is needed for its completion with functions and designs.",
-        "Rename it in the domain.",
+        "The plain domain declares, or its problem uses, a name that is needed for the completion with functions and designs.",
+        "Rename it in the domain, or remove the facts from the problem.",
     ],
     [
         "M117",
@@ -172,9 +172,9 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "M225",
-        "Two entries of `[bindings.names]` contradict each other.",
-        "One object would be two individuals, or one individual two objects.",
-        "Remove one of them.",
+        "Two individuals have one name in PDDL.",
+        "Their names differ only in the namespace or in case, which PDDL ignores, or entries of `[bindings.names]` contradict each other. One object would be two individuals, or one individual two objects.",
+        "Rename one of them, or correct the entries.",
     ],
     [
         "M226",
@@ -205,6 +205,18 @@ pub const CODES: &[[&str; 4]] = &[
         "A function has a value, but a sum over designs replaces it.",
         "`[bindings]` binds it to `chosen:ATTRIBUTE` or `reconfigured:ATTRIBUTE`, and the problem gives it a value.",
         "Remove the binding if the function is a variable of the problem, and otherwise the value.",
+    ],
+    [
+        "M234",
+        "An attribute has several values.",
+        "A design has different estimations of one attribute, or an attribute has different measured values. The problem uses the attribute, and nothing decides which value counts.",
+        "Remove all values but one.",
+    ],
+    [
+        "M235",
+        "A binding does not fit its symbol.",
+        "`[bindings]` binds a symbol to a query of another kind, for example a predicate with one parameter to `solves`.",
+        "Use a query that fits the symbol, or remove the binding, so that the default applies.",
     ],
     [
         "M310",

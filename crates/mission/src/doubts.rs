@@ -11,7 +11,7 @@ use pddl::{Diagnostic, Severity, print_domain};
 use rules::{Engine, Fact};
 
 use crate::joined::Mission;
-use crate::knowledge::Knowledge;
+use crate::knowledge::{Knowledge, doubt_about};
 use crate::message::{Message, did_you_mean};
 
 impl Mission {
@@ -74,12 +74,17 @@ impl Mission {
         let schemas: Vec<&Name> = self.domain.actions.iter().map(|action| &action.identifier.name).collect();
         let predicates: Vec<&Name> =
             self.domain.predicates.iter().map(|predicate| &predicate.identifier.name).collect();
-        let actions = knowledge.view().actions().into_iter();
-        let relevant = actions.filter(|action| !action.requires.is_empty() || !action.quality.is_empty());
+        let view = knowledge.view();
+        let actions = view.actions();
+        let relevant =
+            actions.iter().filter(|action| !action.requires.is_empty() || !action.quality.is_empty());
         let mut doubts = Vec::new();
         for action in relevant {
             let name = &action.individual.name;
-            let has_schema = schemas.iter().any(|schema| self.bindings.is_action(schema, &action.individual));
+            let mut names =
+                actions.iter().filter(|other| view.are_same(&action.individual.iri, &other.individual.iri));
+            let has_schema = names
+                .any(|other| schemas.iter().any(|schema| self.bindings.is_action(schema, &other.individual)));
             if has_schema
                 || predicates.iter().any(|predicate| self.bindings.says_needs(predicate, &action.individual))
             {
@@ -257,25 +262,4 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
         }
     }
     doubts
-}
-
-/// Creates a warning at the first occurrence of an individual's local name in the documents, except on
-/// comment lines. Without an occurrence, the warning has no location.
-pub fn doubt_about(knowledge: &Knowledge, code: &str, iri: &str, text: String) -> Message {
-    let name = local_name(iri);
-    // `fd_a` must not match inside `fd_ab`, and a comment is not the place to correct.
-    let is_part = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '-');
-    for file in knowledge.documents() {
-        let Ok(document) = std::fs::read_to_string(file) else { continue };
-        for (line, number) in document.lines().zip(1..) {
-            let place = line.match_indices(name).find(|(at, _)| {
-                !is_part(line[..*at].chars().next_back()) && !is_part(line[at + name.len()..].chars().next())
-            });
-            if let Some((at, _)) = place.filter(|_| !line.trim_start().starts_with('#')) {
-                let column = line[..at].chars().count() + 1;
-                return Message::warning_at(code, file, (number, column), text).with_source(&document);
-            }
-        }
-    }
-    Message::warning(code, text)
 }

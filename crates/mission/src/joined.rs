@@ -14,6 +14,7 @@ use crate::message::{Errors, Message};
 use crate::names::{self, Meeting, NeverNamed};
 use crate::native::CoAdaptation;
 use crate::planta::Planta;
+use crate::values::several_values;
 
 /// A mission that is ready for planning: a domain, a problem and, optionally, a knowledge base.
 #[derive(Debug, Clone)]
@@ -50,8 +51,9 @@ impl Mission {
     ///
     /// # Errors
     /// Errors of the knowledge base, unreadable files, files of another kind, and syntax errors of the domain and the
-    /// problem. Without such errors: errors of `[bindings.names]`, required functions without a common design, and
-    /// errors of co-adaptation. Symbols and types of PDDL are not checked; see [`Mission::filled`].
+    /// problem. Without such errors: errors of `[bindings]` and `[bindings.names]`, required functions without a common
+    /// design, errors of co-adaptation, different individuals with one name, and different values of one attribute.
+    /// Symbols and types of PDDL are not checked; see [`Mission::filled`].
     pub fn new(
         name: &str,
         knowledge: Option<Result<Knowledge, Errors>>,
@@ -98,6 +100,9 @@ impl Mission {
             warnings.extend(more);
             Some(planta)
         });
+        if knowledge.is_some() && planta.is_none() {
+            Errors::unless_empty(bindings.misfits(&domain))?;
+        }
         let (problem_designs, never_named) = match &mut knowledge {
             // PLANTA's form completes the domain with the names of the knowledge base, so no names
             // need to be aligned.
@@ -113,9 +118,19 @@ impl Mission {
             }
             _ => None,
         };
-        let domain = adaptation
-            .as_ref()
-            .map_or_else(|| domain.clone(), |problem_designs| problem_designs.explicit(&domain));
+        let domain =
+            adaptation.as_ref().map_or_else(|| domain.clone(), |adaptation| adaptation.explicit(&domain));
+        let ambiguous = match (&knowledge, &planta) {
+            (Some(knowledge), Some(planta)) => names::merged_by_planta(knowledge, planta),
+            (Some(knowledge), None) => {
+                let adaptation = adaptation.as_ref();
+                let mut errors = names::merged(&domain, knowledge, &bindings, adaptation);
+                errors.extend(several_values(&domain, knowledge, &bindings, adaptation));
+                errors
+            }
+            (None, _) => Vec::new(),
+        };
+        Errors::unless_empty(ambiguous)?;
         let name = name.to_owned();
         Ok(Self {
             name,

@@ -22,13 +22,14 @@ mod names;
 mod native;
 mod planta;
 mod set;
+mod values;
 pub mod visible;
 
 pub use binding::{Bindings, atom};
 pub use called::{Names, Place};
 pub use codes::CODES;
-pub use doubts::doubt_about;
 pub use joined::{Mission, ParsedObjective};
+pub use knowledge::doubt_about;
 pub use message::{Errors, Message};
 pub use native::CoAdaptation;
 pub use set::unused_measurement;

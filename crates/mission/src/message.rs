@@ -132,6 +132,12 @@ impl Message {
         Self(Box::new(details))
     }
 
+    /// Returns this message as an error.
+    #[must_use]
+    pub fn into_error(self) -> Self {
+        Self::of(Details { severity: "error", ..*self.0 })
+    }
+
     /// Adds the source line of the message as an excerpt, if the message has a line and a column. `text` is the
     /// content of the message's file.
     #[must_use]

@@ -19,7 +19,8 @@ impl Mission {
     ///
     /// # Errors
     /// No case matches, a value is not a decimal number, measured values of the attribute have no effect, inference
-    /// exceeds its limits, or the knowledge base decides on the availability of the design.
+    /// exceeds its limits, or the knowledge base decides on the availability of the design or states a fact that the
+    /// setting would remove.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), Message> {
         self.current.take();
         let value = value.trim();
@@ -39,7 +40,7 @@ impl Mission {
     ///
     /// # Errors
     /// No symbol of the problem matches, a value is not a decimal number, or the knowledge base decides on
-    /// the availability of the design.
+    /// the availability of the design or states a fact that the setting would remove.
     pub fn set_in_problem(&mut self, name: &str, value: &str) -> Result<bool, Message> {
         let value = value.trim();
         let words: Vec<&str> = name.split_whitespace().collect();
@@ -56,7 +57,8 @@ impl Mission {
             return Err(Message::error("M106", text));
         }
         let arity = |declared: &[Declaration]| {
-            declared.iter().find(|d| d.identifier.name == symbol).map(|d| d.parameters.len())
+            let declared = declared.iter().find(|d| d.identifier.name == symbol && self.is_settable(d));
+            declared.map(|declared| declared.parameters.len())
         };
         let arguments: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
         if arity(&self.domain.functions) == Some(arguments.len()) {
@@ -64,13 +66,47 @@ impl Mission {
         }
         match (arity(&self.domain.predicates), value.to_ascii_lowercase().as_str()) {
             (Some(arity), truth @ ("true" | "false")) if arity == arguments.len() => {
-                Ok(self.set_fact(&symbol, &arguments, truth == "true"))
+                let holds = truth == "true";
+                if !holds {
+                    self.check_removal(&symbol, &|own| same_terms(own, &arguments))?;
+                }
+                Ok(self.set_fact(&symbol, &arguments, holds))
             }
             (Some(arity), _) if arity == arguments.len() + 1 => {
-                Ok(self.replace_last(&symbol, arguments, Name::new(value)))
+                let last = Name::new(value);
+                self.check_removal(&symbol, &|own| match own.split_last() {
+                    Some((own_last, others)) => *own_last.name() != last && same_terms(others, &arguments),
+                    None => false,
+                })?;
+                Ok(self.replace_last(&symbol, arguments, last))
             }
             _ => Err(self.unknown_setting(name, value)),
         }
+    }
+
+    /// Fails if the knowledge base states a fact of the predicate that a setting would remove: one for whose arguments
+    /// `is_removed` returns `true`.
+    fn check_removal(&self, predicate: &Name, is_removed: &dyn Fn(&[Term]) -> bool) -> Result<(), Message> {
+        let is_known = self.completed_predicates().is_some_and(|known| known.contains(predicate));
+        if self.knowledge.is_none() || !is_known && !self.bindings.is_bound_predicate(predicate) {
+            return Ok(());
+        }
+        let removed = |element: &InitialElement| match element {
+            InitialElement::Fact(atom) if atom.predicate.name == *predicate => is_removed(&atom.arguments),
+            _ => false,
+        };
+        let mut problem = self.problem.clone();
+        problem.init.retain(|element| !removed(element));
+        self.fill(&mut problem);
+        let Some(InitialElement::Fact(atom)) = problem.init.iter().find(|element| removed(element)) else {
+            return Ok(());
+        };
+        let words: Vec<&str> = atom.arguments.iter().map(|argument| argument.name().as_str()).collect();
+        let text = format!(
+            "the knowledge base states `({predicate} {})`, which a setting cannot remove; change it in the knowledge base",
+            words.join(" ")
+        );
+        Err(Message::error("M106", text))
     }
 
     fn set_value(&mut self, function: &Name, arguments: &[Name], value: &str) -> Result<bool, Message> {

@@ -118,9 +118,9 @@ pub fn design_realisable(engine: &mut Engine, design: &str, realisable: bool) ->
 /// Builds the update that sets the measured value of a quality attribute, given by the IRI or local name of its
 /// type.
 ///
-/// If no individual holds measurements of this type, the update adds an individual `obs_<type>`. Groundings
-/// whose design has an estimation of the type are linked to the individuals that hold the measurement, as
-/// required by the rules of MROS.
+/// If no individual holds measurements of this type, the update adds an individual `obs_<type>`, or `obs_<type>_` if
+/// that is another value. Groundings whose design has an estimation of the type are linked to the individuals that
+/// hold the measurement, as required by the rules of MROS.
 ///
 /// # Errors
 /// Returns [`Error::Unknown`] if the knowledge base has no such attribute type.
@@ -134,7 +134,15 @@ pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> R
         let iri = facts.name(kind).unwrap_or_default();
         let name = local_name(iri);
         // The IRI has the namespace of the attribute type and the prefix `obs_` of MROS.
-        let holder = format!("{}obs_{name}", &iri[..iri.len() - name.len()]);
+        let mut holder = format!("{}obs_{name}", &iri[..iri.len() - name.len()]);
+        // An estimation can have this name. It keeps its value.
+        let is_value = |iri: &str| {
+            let symbol = engine.symbols().find_name(iri);
+            symbol.is_some_and(|symbol| !facts.objects(symbol, terms::IS_TYPE).is_empty())
+        };
+        while is_value(&holder) {
+            holder.push('_');
+        }
         let holder = engine.symbols_mut().name(&holder);
         delta.insert = observation(engine.symbols_mut(), holder, kind, class);
         holders.push(holder);
@@ -179,9 +187,13 @@ fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str)
 }
 
 /// Returns the individuals that hold measurements of an attribute type: individuals with `isMeasured`
-/// true, and individuals named `obs_…` as in MROS.
+/// true, and individuals named `obs_…` as in MROS that have no `isMeasured` and are no estimations of designs.
 pub(crate) fn holders(facts: Facts, kind: Symbol) -> Vec<Symbol> {
-    let named = |holder| facts.name(holder).is_some_and(|iri| local_name(iri).starts_with("obs_"));
+    let named = |holder| {
+        facts.name(holder).is_some_and(|iri| local_name(iri).starts_with("obs_"))
+            && facts.literals(holder, terms::IS_MEASURED).is_empty()
+            && facts.subjects(holder, terms::HAS_ESTIMATION).is_empty()
+    };
     let mut holders = facts.subjects(kind, terms::IS_TYPE);
     holders.retain(|&holder| named(holder) || facts.is_true(holder, terms::IS_MEASURED));
     holders

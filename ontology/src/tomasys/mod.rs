@@ -17,9 +17,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
 use num_rational::BigRational;
-use rules::{Engine, Literal, Symbol, Value};
+use rules::{Engine, Fact, Literal, Symbol, Value};
 
-use crate::vocab::local_name;
+use crate::vocab::{local_name, owl};
 use terms::Term;
 
 /// An individual with its IRI and name.
@@ -50,7 +50,8 @@ pub struct FunctionDesign {
     pub solves: Vec<Individual>,
     /// The components that the design requires.
     pub components: Vec<Individual>,
-    /// Maps the name of each estimated attribute type to the estimated value, in the unit of the type.
+    /// Maps the name of each estimated attribute type to the estimated value, in the unit of the type. Of several
+    /// values, this is the largest.
     pub estimations: BTreeMap<String, BigRational>,
     /// Bounds on measured attributes.
     pub requirements: Vec<Requirement>,
@@ -91,12 +92,24 @@ pub struct Measurement {
     pub value: Option<BigRational>,
 }
 
+/// An estimated value of a design.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Estimation {
+    /// The individual that holds the value.
+    pub individual: Individual,
+    /// Name of the attribute type (as in `Individual::name`).
+    pub attribute: String,
+    /// The value in the unit of the attribute type.
+    pub value: BigRational,
+}
+
 /// An individual of the class Action: the knowledge base states which functions this kind of action requires.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Action {
     /// The action.
     pub individual: Individual,
-    /// The functions that are required while the action runs.
+    /// The functions that are required while the action runs. Of functions that are stated to be the same, only the
+    /// first one.
     pub requires: Vec<Individual>,
     /// Bounds on estimated attributes of the designs that are selected for these functions.
     pub quality: Vec<Quality>,
@@ -182,9 +195,40 @@ impl<'a> View<'a> {
         self.members(terms::ATTRIBUTE_TYPE)
     }
 
+    /// Returns the quality attribute types of all values and bounds, sorted by IRI.
+    pub fn used_attribute_types(&self) -> Vec<Individual> {
+        let edges = terms::IS_TYPE.iter().map(|property| self.edges(property, true));
+        let kinds: Vec<Symbol> = edges.flat_map(|edges| edges.keys().copied().collect::<Vec<_>>()).collect();
+        sorted(kinds.into_iter().filter_map(|kind| self.individual(kind)))
+    }
+
+    /// Returns `true` if two IRIs are equal, or if the facts state that they name one individual.
+    pub fn are_same(&self, iri: &str, other: &str) -> bool {
+        let symbol = |name: &str| self.engine.symbols().find_name(name);
+        let (same_as, names) = (symbol(owl::SAME_AS), symbol(iri).zip(symbol(other)));
+        iri == other
+            || same_as.zip(names).is_some_and(|(same_as, (first, second))| {
+                self.engine.holds(&Fact::new(same_as, [first, second]))
+            })
+    }
+
     /// Returns all function designs, sorted by IRI.
     pub fn function_designs(&self) -> Vec<FunctionDesign> {
         self.members(terms::FUNCTION_DESIGN).into_iter().map(|design| self.function_design(design)).collect()
+    }
+
+    /// Returns the estimated values of a design, given by IRI, sorted by the individuals that hold them. A value of
+    /// attribute types that are stated to be the same is returned for each of them.
+    pub fn estimations(&self, design_iri: &str) -> Vec<Estimation> {
+        let mut estimations = Vec::new();
+        for individual in self.objects(design_iri, terms::HAS_ESTIMATION) {
+            let Some(value) = self.number(&individual.iri, terms::HAS_VALUE) else { continue };
+            for attribute in self.objects(&individual.iri, terms::IS_TYPE) {
+                let (individual, attribute, value) = (individual.clone(), attribute.name, value.clone());
+                estimations.push(Estimation { individual, attribute, value });
+            }
+        }
+        estimations
     }
 
     /// Returns all components with their statuses, sorted by IRI.
@@ -197,12 +241,15 @@ impl<'a> View<'a> {
         components.map(|individual| Component { status: status(&individual), individual }).collect()
     }
 
-    /// Returns all measured values: quality attribute values with `isMeasured` true, or named `obs_…` as in MROS.
-    /// Omits individuals without an attribute type.
+    /// Returns all measured values: quality attribute values with `isMeasured` true, and those named `obs_…` as in MROS
+    /// that have no `isMeasured` and are no estimations of designs. Omits individuals without an attribute type.
     pub fn measurements(&self) -> Vec<Measurement> {
         let measured = |value: &Individual| {
-            value.name.starts_with("obs_")
-                || self.literals(&value.iri, terms::IS_MEASURED).contains(&&Literal::Boolean(true))
+            let stated = self.literals(&value.iri, terms::IS_MEASURED);
+            stated.contains(&&Literal::Boolean(true))
+                || stated.is_empty()
+                    && value.name.starts_with("obs_")
+                    && self.subjects(&value.iri, terms::HAS_ESTIMATION).is_empty()
         };
         let measurement = |individual: Individual| {
             let attribute = self.objects(&individual.iri, terms::IS_TYPE).into_iter().next()?.name;
@@ -215,7 +262,12 @@ impl<'a> View<'a> {
     /// Returns all actions with the functions that they require, sorted by IRI.
     pub fn actions(&self) -> Vec<Action> {
         let action = |individual: Individual| {
-            let requires = self.objects(&individual.iri, terms::REQUIRES_F);
+            let mut requires: Vec<Individual> = Vec::new();
+            for function in self.objects(&individual.iri, terms::REQUIRES_F) {
+                if !requires.iter().any(|first| self.are_same(&first.iri, &function.iri)) {
+                    requires.push(function);
+                }
+            }
             let quality = self.objects(&individual.iri, terms::REQUIRES_QUALITY).into_iter();
             let quality = quality.filter_map(|individual| {
                 let context = self.literals(&individual.iri, terms::IN_CONTEXT).into_iter().next();
@@ -236,10 +288,10 @@ impl<'a> View<'a> {
 
     fn function_design(&self, individual: Individual) -> FunctionDesign {
         let iri = individual.iri.as_str();
-        let attribute = |value: &Individual| self.objects(&value.iri, terms::IS_TYPE).into_iter().next();
-        let estimation =
-            |value: &Individual| Some((attribute(value)?.name, self.number(&value.iri, terms::HAS_VALUE)?));
-        let estimations = self.objects(iri, terms::HAS_ESTIMATION).iter().filter_map(estimation).collect();
+        let mut estimations = self.estimations(iri);
+        // The map keeps the last value of an attribute. The order of individuals has no meaning, so it must not decide.
+        estimations.sort_by(|a, b| a.value.cmp(&b.value));
+        let estimations = estimations.into_iter().map(|own| (own.attribute, own.value)).collect();
         let requirements = self.objects(iri, terms::HAS_REQUIREMENT);
         let requirements = requirements.iter().filter_map(|value| self.requirement(value)).collect();
         let denied = |term| self.literals(iri, term).contains(&&Literal::Boolean(false));

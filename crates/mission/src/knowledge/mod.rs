@@ -2,6 +2,7 @@
 
 mod base;
 mod catalogue;
+mod mention;
 mod reports;
 mod sources;
 mod statement;
@@ -10,6 +11,7 @@ mod waiting;
 
 pub use base::{Contradiction, Knowledge};
 pub use catalogue::Catalogue;
+pub use mention::doubt_about;
 pub use sources::{COADAPTATION, Sources, Stated, TOMASYS, rule_text};
 pub use statement::{Part, Statement, Statements};
 pub use value_reads::{VALUE_PROPERTIES, ValueRead};

@@ -6,13 +6,13 @@
 //! design of each function that the action requires. The action also gets conditions: the design solves the
 //! function, is available, and meets the quality bounds of the action (`t:requiresQuality`). A quality bound with a
 //! context, which is a predicate of the domain, applies only while this predicate holds for the action's
-//! parameters.
+//! parameters, including the moment at which the action starts.
 //!
 //! A numeric function without parameters that is named like an estimated attribute is replaced by the sum over the
 //! chosen designs, unless the attribute is measured or the function has an initial value. A function that is bound to
 //! `chosen:ATTRIBUTE` is replaced in the same way. A function that is bound to `reconfigured:ATTRIBUTE` is replaced
 //! by the sum over the newly chosen designs, i.e. those that replace another design of their function; the first
-//! design of a function is not counted.
+//! design of a function is not counted, and neither is a design without an estimation.
 //!
 //! As in an explicit domain, the planner chooses the designs for these parameters without grounding them into actions,
 //! unless reconfiguration costs make the designs part of the state.
@@ -25,13 +25,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use num_rational::BigRational;
 use num_traits::Zero as _;
-use ontology::tomasys::{FunctionDesign, Quality, View};
+use ontology::tomasys::{FunctionDesign, Individual, Quality, View};
 use pddl::ast::{
     Action, ActionBody, Arithmetic, Assignment, Condition, ConditionTime, Declaration, Domain, Effect,
-    EffectTime, Expression, Identifier, Name, Problem, Span, Term, TypeExpression, TypedName,
+    EffectTime, Expression, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
 };
 
-use crate::binding::{Bindings, atom, identifier, is_pddl_name};
+use crate::binding::{Bindings, add_values, atom, identifier, is_pddl_name};
 use crate::message::{Errors, Message};
 use walk::{mentions, walk_uncounted};
 
@@ -83,14 +83,23 @@ impl CoAdaptation {
         }
         let designs = view.function_designs();
         let known_actions = view.actions();
-        let mut actions = BTreeMap::new();
+        let (mut actions, mut errors) = (BTreeMap::new(), Vec::new());
         for action in &domain.actions {
             let name = &action.identifier.name;
-            let Some(known_action) =
-                known_actions.iter().find(|action| bindings.is_action(name, &action.individual))
-            else {
-                continue;
-            };
+            let mut matching = known_actions.iter().filter(|action| {
+                bindings.is_action(name, &action.individual)
+                    && !(action.requires.is_empty() && action.quality.is_empty())
+            });
+            let Some(known_action) = matching.next() else { continue };
+            let iri = &known_action.individual.iri;
+            if let Some(other) = matching.find(|other| !view.are_same(iri, &other.individual.iri)) {
+                let text = format!(
+                    "the action `{name}` corresponds to both <{iri}> and <{other}>; bind it to one of them: `{name} = \
+                     \"action:{iri}\"`",
+                    other = other.individual.iri
+                );
+                errors.push(Message::error("M225", text));
+            }
             let functions = known_action.requires.iter().map(|function| Needed {
                 name: function.name.clone(),
                 attributes: estimated(designs.iter().filter(|design| design.solves.contains(function))),
@@ -101,13 +110,14 @@ impl CoAdaptation {
                 actions.insert(name.clone(), Needs { functions, quality, parameters });
             }
         }
-        if actions.is_empty() {
+        if actions.is_empty() && errors.is_empty() {
             return Ok(None);
         }
         let (chosen, changed) = attributes(domain, problem, view, &designs, bindings);
         let adaptation = Self { actions, chosen, changed };
-        let mut errors = adaptation.errors(domain);
+        errors.extend(adaptation.errors(domain));
         errors.extend(adaptation.valued(problem));
+        errors.extend(adaptation.stated(problem));
         if errors.is_empty() { Ok(Some(adaptation)) } else { Err(errors.into()) }
     }
 
@@ -124,6 +134,23 @@ impl CoAdaptation {
             Message::error("M233", text)
         };
         valued.map(error).collect()
+    }
+
+    /// Returns errors for facts of the problem that state which designs meet a quality bound. The knowledge base decides.
+    fn stated(&self, problem: &Problem) -> Vec<Message> {
+        let predicates: BTreeSet<Name> = self.quality().into_iter().map(meets).collect();
+        let stated = problem.init.iter().filter_map(|element| match element {
+            InitialElement::Fact(atom) => Some(&atom.predicate.name),
+            _ => None,
+        });
+        let stated: BTreeSet<&Name> = stated.filter(|name| predicates.contains(*name)).collect();
+        let error = |name: &Name| {
+            let text = format!(
+                "the problem states facts of `{name}`, which co-adaptation adds to a plain domain; remove them"
+            );
+            Message::error("M116", text)
+        };
+        stated.into_iter().map(error).collect()
     }
 
     fn errors(&self, domain: &Domain) -> Vec<Message> {
@@ -237,23 +264,60 @@ impl CoAdaptation {
     }
 
     /// For each quality bound, adds facts to the problem for the designs that meet it. A design that lacks an
-    /// estimate still meets the bound if no design of its functions has an estimate of the attribute.
+    /// estimate still meets the bound if no design of its functions has an estimate of the attribute. Adds the values
+    /// for changes of designs that the bindings do not add.
     pub(super) fn fill(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
+        self.fill_changes(problem, designs);
         for quality in self.quality() {
             for design in designs {
-                let concerned = self.needed().any(|needed| {
-                    design.solves.iter().any(|function| function.name == needed.name)
-                        && needed.attributes.contains(&quality.bounds.attribute)
-                });
+                let concerned = self.is_concerned(design, &quality.bounds.attribute);
                 let kept = design.estimations.get(&quality.bounds.attribute).is_some_and(|value| {
                     quality.bounds.minimum.as_ref().is_none_or(|minimum| value >= minimum)
                         && quality.bounds.maximum.as_ref().is_none_or(|maximum| value <= maximum)
                 });
                 if (kept || !concerned) && is_pddl_name(&design.individual.name) {
                     let fact = atom(&meets(quality), &[&design.individual.name]);
-                    problem.init.push(pddl::ast::InitialElement::Fact(fact));
+                    problem.init.push(InitialElement::Fact(fact));
                 }
             }
+        }
+    }
+
+    /// Adds the value 0 for a change to a design without an estimation. Without a value, no action could change to the
+    /// design.
+    fn fill_changes(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
+        let attributes: BTreeSet<&String> = self.changed.values().collect();
+        for attribute in attributes {
+            let function = self.change_of(attribute);
+            let is_filled_by_binding = function == value_of(attribute);
+            let concerned = designs.iter().filter(|design| self.is_concerned(design, attribute));
+            let values = concerned.filter_map(|design| {
+                let value = match design.estimations.get(attribute) {
+                    Some(_) if is_filled_by_binding => return None,
+                    Some(value) => value.clone(),
+                    None => BigRational::zero(),
+                };
+                Some((vec![design.individual.name.clone()], value))
+            });
+            add_values(problem, &Name::new(&function), values.collect());
+        }
+    }
+
+    /// Returns `true` if the design solves a required function of which some design has an estimation of the attribute.
+    fn is_concerned(&self, design: &FunctionDesign, attribute: &str) -> bool {
+        self.needed().any(|needed| {
+            design.solves.iter().any(|function| function.name == needed.name)
+                && needed.attributes.contains(attribute)
+        })
+    }
+
+    /// Returns the name of the numeric function that has the value of an attribute for a change to a design. It differs
+    /// from that for a chosen design if both are used, because only a change is free without an estimation.
+    fn change_of(&self, attribute: &str) -> String {
+        if self.chosen.values().any(|chosen| chosen == attribute) {
+            value_of(&format!("reconfigured_{attribute}"))
+        } else {
+            value_of(attribute)
         }
     }
 
@@ -266,6 +330,17 @@ impl CoAdaptation {
         bounds.sort_by(|a, b| a.individual.cmp(&b.individual));
         bounds.dedup();
         bounds
+    }
+
+    /// Returns the individuals that hold the quality bounds of the domain's actions. Each has a predicate.
+    pub(crate) fn requirements(&self) -> BTreeSet<Individual> {
+        self.quality().into_iter().map(|quality| quality.individual.clone()).collect()
+    }
+
+    /// Returns the names of the attributes of sums over designs and of quality bounds.
+    pub(crate) fn attributes(&self) -> BTreeSet<String> {
+        let bounded = self.quality().into_iter().map(|quality| &quality.bounds.attribute);
+        self.chosen.values().chain(self.changed.values()).chain(bounded).cloned().collect()
     }
 
     fn predicates(&self) -> Vec<Declaration> {
@@ -283,8 +358,10 @@ impl CoAdaptation {
     }
 
     fn functions(&self) -> Vec<Declaration> {
-        let attributes: BTreeSet<&String> = self.chosen.values().chain(self.changed.values()).collect();
-        attributes.into_iter().map(|attribute| declaration(&value_of(attribute), &[("fd", DESIGN)])).collect()
+        let chosen = self.chosen.values().map(|attribute| value_of(attribute));
+        let changed = self.changed.values().map(|attribute| self.change_of(attribute));
+        let names: BTreeSet<String> = chosen.chain(changed).collect();
+        names.iter().map(|name| declaration(name, &[("fd", DESIGN)])).collect()
     }
 
     fn adapt(&self, action: &mut Action, needs: &Needs, domain: &Domain) {
@@ -324,6 +401,9 @@ impl CoAdaptation {
                     condition.change_leaves(&mut |leaf| rewrite(leaf));
                 }
                 conditions.extend(chosen.into_iter().map(|condition| (ConditionTime::AtStart, condition)));
+                // A context that the action ends at its start holds then, but not in the interval after the start.
+                let ended = lasting.iter().filter(|condition| is_ended_context(condition, effects, domain));
+                conditions.extend(ended.map(|condition| (ConditionTime::AtStart, condition.clone())));
                 conditions.extend(lasting.into_iter().map(|condition| (ConditionTime::OverAll, condition)));
                 let mut additions = Vec::new();
                 for (time, effect) in &mut *effects {
@@ -369,7 +449,7 @@ impl CoAdaptation {
                         let Expression::Fluent(fluent) = part else { return };
                         let attribute = self.changed.get(&fluent.predicate.name);
                         if let Some(attribute) = attribute.filter(|own| needed.attributes.contains(*own)) {
-                            *part = Expression::Fluent(of_design(&value_of(attribute), design, None));
+                            *part = Expression::Fluent(of_design(&self.change_of(attribute), design, None));
                         }
                     });
                     let counts = mentions(expression, &|name| self.changed.contains_key(name));
@@ -443,6 +523,32 @@ fn conditions(
     (chosen, lasting)
 }
 
+/// Returns `true` if a condition is a quality bound with a context that the start effects of the action may end. The
+/// truth of a derived predicate may depend on every effect.
+fn is_ended_context(condition: &Condition, effects: &[(EffectTime, Effect)], domain: &Domain) -> bool {
+    let Condition::Or(parts) = condition else { return false };
+    let context = parts.iter().find_map(|part| match part {
+        Condition::Not(context) => match &**context {
+            Condition::Atom(context) => Some(&context.predicate.name),
+            _ => None,
+        },
+        _ => None,
+    });
+    let is_derived =
+        |context: &Name| domain.derived.iter().any(|axiom| axiom.head.identifier.name == *context);
+    let mut starts = effects.iter().filter(|(time, _)| *time == EffectTime::AtStart);
+    context.is_some_and(|context| starts.any(|(_, effect)| is_derived(context) || deletes(effect, context)))
+}
+
+fn deletes(effect: &Effect, predicate: &Name) -> bool {
+    match effect {
+        Effect::And(parts) => parts.iter().any(|part| deletes(part, predicate)),
+        Effect::ForAll(_, inner) | Effect::When(_, inner) => deletes(inner, predicate),
+        Effect::Delete(atom) => atom.predicate.name == *predicate,
+        Effect::Add(_) | Effect::Assign(..) => false,
+    }
+}
+
 /// Returns the condition that `function` was last configured with another design than `design`.
 fn changed(design: &Identifier, function: &str) -> Condition {
     let at_work = Condition::Atom(of_design(AT_WORK, design, Some(function)));
@@ -479,9 +585,9 @@ fn attributes(
 }
 
 fn has_value(problem: &Problem, function: &Name) -> bool {
-    problem.init.iter().any(|element| {
-        matches!(element, pddl::ast::InitialElement::Value(atom, _, _) if atom.predicate.name == *function)
-    })
+    problem.init.iter().any(
+        |element| matches!(element, InitialElement::Value(atom, _, _) if atom.predicate.name == *function),
+    )
 }
 
 fn estimated<'a>(designs: impl Iterator<Item = &'a FunctionDesign>) -> BTreeSet<String> {

@@ -37,6 +37,7 @@ impl Terms {
                 }
             }
         }
+        terms.merged_predicates();
         if !skipped.is_empty() {
             skipped.sort_unstable();
             skipped.dedup();

@@ -22,7 +22,7 @@ mod terms;
 use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 
-use ontology::Ontology;
+use ontology::{Iri, Ontology};
 use pddl::ast::{Domain, InitialElement, Name, Problem, Term};
 use pddl::{Mentioned, Source};
 use rules::{Engine, Fact, Literal, Value};
@@ -87,6 +87,12 @@ impl Planta {
 
     pub(crate) fn known(&self) -> &HashSet<Name> {
         &self.known
+    }
+
+    /// Returns the pairs of different entities or values of the knowledge base that have one name in PDDL: the IRI of
+    /// one of them, if it has one, and a description.
+    pub(crate) fn merged(&self) -> &BTreeSet<(Option<Iri>, String)> {
+        &self.terms.merged
     }
 
     pub(crate) fn unknown(completed: &Domain) -> Vec<Message> {

@@ -6,6 +6,7 @@
 //! predicates over inferred names.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 
 use ontology::vocab::{owl, pddl as annotation};
 use ontology::{ANONYMOUS, Axiom, ClassExpression, EntityKind, Iri, ObjectPropertyExpression, Ontology};
@@ -33,6 +34,27 @@ pub struct Terms {
     pub(super) numbers: BTreeSet<Name>,
     pub(super) literals: Literals,
     pub(super) warnings: Vec<Message>,
+    /// Individual or value that each constant denotes.
+    denoted: BTreeMap<Name, Denoted>,
+    /// Sets of individuals that are stated to be the same.
+    same: Vec<Vec<Iri>>,
+    /// Different entities or values that have one name in PDDL: IRI of one of them, if it has one, and description.
+    pub(super) merged: BTreeSet<(Option<Iri>, String)>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Denoted {
+    Individual(Iri),
+    Value(Literal),
+}
+
+impl fmt::Display for Denoted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Individual(iri) => write!(f, "<{iri}>"),
+            Self::Value(value) => write!(f, "{value}"),
+        }
+    }
 }
 
 impl Terms {
@@ -79,6 +101,11 @@ impl Terms {
     /// Collects the constants: named individuals with their types, and values in assertions, except numbers.
     pub(super) fn types(&mut self, ontology: &Ontology) {
         let (mut kinds, mut spelled) = (BTreeMap::new(), BTreeMap::new());
+        let same_individuals = ontology.axioms.iter().filter_map(|annotated| match &annotated.axiom {
+            Axiom::SameIndividual(individuals) => Some(individuals.clone()),
+            _ => None,
+        });
+        self.same = same_individuals.collect();
         for annotated in &ontology.axioms {
             match &annotated.axiom {
                 Axiom::ObjectPropertyAssertion(ObjectPropertyExpression::Property(property), own, r#type)
@@ -106,12 +133,14 @@ impl Terms {
             }
         }
         for (individual, kind) in kinds {
+            self.individual(&individual);
             self.constants.insert(names::plain(&individual), spelled.get(&kind).cloned());
         }
     }
 
     pub(super) fn individual(&mut self, iri: &Iri) -> Name {
         let name = names::plain(iri);
+        self.denote(&name, Denoted::Individual(iri.clone()));
         if !iri.starts_with(ANONYMOUS) {
             self.constants.entry(name.clone()).or_insert(None);
         }
@@ -125,12 +154,50 @@ impl Terms {
         let value = Literal::parse(&literal.lexical, datatype, language);
         self.literals.insert(value.clone(), names::literal(&literal.lexical, datatype));
         let name = self.literals.name(&value);
+        self.denote(&name, Denoted::Value(value.clone()));
         if !value.is_numeric() {
             self.constants.entry(name.clone()).or_insert(None);
         } else if in_rule {
             self.numbers.insert(name.clone());
         }
         name
+    }
+
+    /// Records the individual or value of a constant. Reports it if the constant already denotes another one.
+    fn denote(&mut self, name: &Name, denoted: Denoted) {
+        let Some(other) = self.denoted.get(name) else {
+            self.denoted.insert(name.clone(), denoted);
+            return;
+        };
+        let is_same = match (other, &denoted) {
+            (Denoted::Individual(other), Denoted::Individual(iri)) => {
+                other == iri || self.same.iter().any(|same| same.contains(other) && same.contains(iri))
+            }
+            (other, denoted) => other == denoted,
+        };
+        if !is_same {
+            let iri = match &denoted {
+                Denoted::Individual(iri) => Some(iri.clone()),
+                Denoted::Value(_) => None,
+            };
+            self.merged.insert((iri, one_name(name, &other.to_string(), &denoted.to_string())));
+        }
+    }
+
+    /// Reports different classes and properties that have one predicate.
+    pub(super) fn merged_predicates(&mut self) {
+        let mut first_by_name: BTreeMap<&Name, &Iri> = BTreeMap::new();
+        for (iri, name) in &self.symbols {
+            match first_by_name.get(name) {
+                Some(first) => {
+                    let text = one_name(name, &format!("<{first}>"), &format!("<{iri}>"));
+                    self.merged.insert((Some(iri.clone()), text));
+                }
+                None => {
+                    first_by_name.insert(name, iri);
+                }
+            }
+        }
     }
 
     /// Adds an axiom for each class and property: the inferred predicate holds for asserted facts.
@@ -143,6 +210,13 @@ impl Terms {
             self.derived.push(axiom(names::inferred(&name), variables, stated));
         }
     }
+}
+
+fn one_name(name: &Name, first: &str, second: &str) -> String {
+    format!(
+        "`{name}` would be both {first} and {second}, because PDDL ignores namespaces and case and allows fewer \
+         characters; rename one of them in the knowledge base"
+    )
 }
 
 pub(super) fn is_annotation(iri: &str) -> bool {

@@ -1,0 +1,86 @@
+//! Finds individuals of the knowledge base that would be one object, predicate or numeric function of the planning
+//! problem. PDDL has one name space and ignores case, so this happens to individuals whose names differ only in their
+//! namespaces or in case.
+//!
+//! Individuals that the problem does not use may have equal names, and so may names of one individual.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use ontology::Iri;
+use ontology::tomasys::{Individual, View};
+use pddl::ast::{Domain, Name};
+
+use crate::binding::{self, Bindings};
+use crate::knowledge::{Knowledge, doubt_about};
+use crate::message::Message;
+use crate::native::CoAdaptation;
+use crate::planta::Planta;
+
+/// Returns an error for each pair of individuals that would be merged. `domain` is the explicit form of the domain.
+pub(crate) fn merged(
+    domain: &Domain,
+    knowledge: &Knowledge,
+    bindings: &Bindings,
+    adaptation: Option<&CoAdaptation>,
+) -> Vec<Message> {
+    let view = knowledge.view();
+    let mut pairs = pairs(&view, binding::individuals(domain, knowledge, bindings), |individual| {
+        Name::new(&individual.name)
+    });
+    let mut attributes = binding::attributes(domain, bindings);
+    if let Some(adaptation) = adaptation {
+        pairs.extend(self::pairs(&view, adaptation.requirements(), |own| Name::new(&own.name)));
+        attributes.extend(adaptation.attributes());
+    }
+    let used = view.used_attribute_types().into_iter();
+    if adaptation.is_some() {
+        // The explicit form of a plain domain declares functions with the names of attributes.
+        let attributes: BTreeSet<Name> = attributes.iter().map(|attribute| Name::new(attribute)).collect();
+        let used = used.filter(|own| attributes.contains(&Name::new(&own.name)));
+        pairs.extend(self::pairs(&view, used.collect(), |own| Name::new(&own.name)));
+    } else {
+        let used = used.filter(|own| attributes.contains(&own.name));
+        pairs.extend(self::pairs(&view, used.collect(), |own| own.name.clone()));
+    }
+    pairs.iter().map(|(first, second)| error(knowledge, first, second)).collect()
+}
+
+/// Returns an error for each pair of entities or values that would be merged in PLANTA's form.
+pub(crate) fn merged_by_planta(knowledge: &Knowledge, planta: &Planta) -> Vec<Message> {
+    let error = |(iri, text): &(Option<Iri>, String)| match iri {
+        Some(iri) => doubt_about(knowledge, "M225", iri, text.clone()).into_error(),
+        None => Message::error("M225", text.as_str()),
+    };
+    planta.merged().iter().map(error).collect()
+}
+
+/// Returns the pairs of different individuals with equal keys. Of more than two, each is paired with the first.
+fn pairs<K: Ord>(
+    view: &View<'_>,
+    individuals: BTreeSet<Individual>,
+    key: impl Fn(&Individual) -> K,
+) -> Vec<(Individual, Individual)> {
+    let mut first_by_key: BTreeMap<K, Individual> = BTreeMap::new();
+    let mut pairs = Vec::new();
+    for individual in individuals {
+        match first_by_key.get(&key(&individual)) {
+            Some(first) if !view.are_same(&first.iri, &individual.iri) => {
+                pairs.push((first.clone(), individual));
+            }
+            Some(_) => {}
+            None => {
+                first_by_key.insert(key(&individual), individual);
+            }
+        }
+    }
+    pairs
+}
+
+fn error(knowledge: &Knowledge, first: &Individual, second: &Individual) -> Message {
+    let text = format!(
+        "`{}` would be both <{}> and <{}>, because PDDL ignores namespaces and case; rename one of them, or give it the \
+         name of another object of the problem in `[bindings.names]`, by its IRI",
+        second.name, first.iri, second.iri
+    );
+    doubt_about(knowledge, "M225", &second.iri, text).into_error()
+}
