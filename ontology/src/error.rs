@@ -152,7 +152,7 @@ pub enum Error {
         /// The rejected value.
         value: String,
     },
-    /// O111: the output syntax cannot express the knowledge base.
+    /// O111: the output syntax cannot express the knowledge base, or the input of [`crate::turtle`] is not N-Triples.
     #[error("error[O111]: cannot be written in {syntax}: {reason}")]
     Unwritable {
         /// The output syntax.
