@@ -237,7 +237,8 @@ impl CoAdaptation {
     }
 
     /// For each quality bound, adds facts to the problem for the designs that meet it. A design that lacks an
-    /// estimate still meets the bound if no design of its functions has an estimate of the attribute.
+    /// estimate still meets the bound if no design of the required functions that it solves has an estimate of the
+    /// attribute.
     pub(super) fn fill(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
         for quality in self.quality() {
             for design in designs {
