@@ -1,8 +1,8 @@
 //! Numeric trace of a plan: the new values of functions at each start and end of an action, and the bounds
 //! that conditions impose.
 //!
-//! Used for charts of plans that [`validate`](super::validate()) has accepted. Effects are applied by the
-//! same rules; conditions are not checked again.
+//! Used for charts of plans that [`validate`](super::validate()) has accepted. Effects are applied by the same rules;
+//! conditions are not enforced.
 
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;
