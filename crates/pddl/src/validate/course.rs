@@ -46,8 +46,8 @@ pub struct CourseMoment {
     /// Bounds on numeric functions that the action's conditions impose at this moment. The bounds at the start
     /// include those of the over-all conditions.
     pub bounds: Vec<NumberBound>,
-    /// Metric value if the plan ended now. `None` without a metric or if the value is undefined. For example,
-    /// a metric that counts violated preferences is undefined before the end.
+    /// Metric value if the plan ended now, with the present time as `total-time`. `None` without a metric or if the
+    /// value is undefined; a metric that counts violated preferences is always undefined here.
     pub metric: Option<BigRational>,
 }
 
