@@ -1,5 +1,5 @@
-//! Lists the function designs of a knowledge base that can be used, and the designs that each component's
-//! failure makes unavailable.
+//! Counts the function designs of a knowledge base. For each component, lists the designs that are unavailable after
+//! its failure.
 //!
 //! `cargo run -p metaplan-ontology --example availability -- KNOWLEDGE_BASE`
 #![expect(clippy::print_stdout, reason = "an example prints")]
@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let designs = runtime.view().function_designs();
     println!("{} designs", designs.len());
     for component in runtime.view().components() {
-        // A copy shares everything that does not change.
+        // The copy shares the relations that do not change.
         let mut broken = runtime.clone();
         broken.report_component(&component.individual.name, Status::Failed)?;
         let lost = broken.view().function_designs();

@@ -152,7 +152,7 @@ pub enum Error {
         /// The rejected value.
         value: String,
     },
-    /// O111: the output syntax cannot express the knowledge base.
+    /// O111: the output syntax cannot express the knowledge base, or the input of [`crate::turtle`] is not N-Triples.
     #[error("error[O111]: cannot be written in {syntax}: {reason}")]
     Unwritable {
         /// The output syntax.
@@ -312,7 +312,7 @@ pub enum Warning {
         /// The unsupported construct.
         reason: String,
     },
-    /// O302: the engine rejects a rule.
+    /// O302: a rule cannot be evaluated.
     #[error("warning[O302]: rule <{ontology}>#{position}{} is left out: {reason}", label_suffix(label.as_deref()))]
     UnusableRule {
         /// IRI of the ontology of the rule, or the name of a document or text without one.
@@ -321,7 +321,7 @@ pub enum Warning {
         position: u32,
         /// Label of the rule.
         label: Option<String>,
-        /// Cause of the rejection.
+        /// Reason why the rule is omitted.
         reason: String,
     },
     /// O303: a rule is disabled in the editor, but evaluated.

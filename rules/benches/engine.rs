@@ -1,6 +1,6 @@
-//! Benchmarks of the engine. From scratch: transitive closure, and relaxed reachability of a transport
-//! task. Incremental: a component that fails and recovers, and a measurement that changes, in knowledge
-//! bases of growing size.
+//! Benchmarks of the engine. From scratch: transitive closure, relaxed reachability of a transport task, and the
+//! rules of co-adaptation. In knowledge bases of growing size: a component that fails and recovers, a measurement
+//! that changes, and copies of the engine.
 
 use std::hint::black_box;
 

@@ -43,7 +43,7 @@ pub enum Error {
         line: u32,
         /// Column in characters, counted from 1.
         column: u32,
-        /// Name as written.
+        /// Local name.
         name: String,
     },
     /// A `swrlb` built-in on lists.
@@ -57,7 +57,7 @@ pub enum Error {
         line: u32,
         /// Column in characters, counted from 1.
         column: u32,
-        /// Name as written.
+        /// Local name.
         name: String,
     },
     /// A predicate in the namespace of a known built-in library, which denotes no supported built-in.

@@ -36,8 +36,8 @@ pub struct Limits {
     /// recursive rule computes for the first time costs 25,000 steps, and 25,000 more for every 8 bytes of its digits
     /// or text. Other new values cost a step for every 8 bytes. A new value of more than 16 MiB exhausts the budget.
     pub steps: u64,
-    /// Function that can stop an update. It is called after about every 16,000 visited rows and charged
-    /// steps.
+    /// Function that can stop a derivation or an update. It is called after about every 16,000 visited rows and
+    /// charged steps.
     pub interrupt: Option<Interrupt>,
 }
 

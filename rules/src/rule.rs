@@ -133,7 +133,7 @@ impl Aggregate {
 /// the source.
 #[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub struct RuleIdentity {
-    /// IRI of the ontology, or name of the file.
+    /// IRI of an ontology, name of a file, or a fixed name for generated rules.
     pub source: Arc<str>,
     /// Label given by the author.
     pub label: Option<Arc<str>>,

@@ -196,7 +196,7 @@ pub struct Preference {
     pub span: Span,
 }
 
-/// Constraint on the trajectory of a plan, that is, on all its states and not only on the last one.
+/// Constraint on the trajectory of a plan, that is, on its sequence of states.
 #[derive(Debug, Clone)]
 pub struct Constraint {
     /// Variables of the quantifiers that enclose the constraint. If the constraint is a preference, each

@@ -199,8 +199,7 @@ fn function(node: Node<'_>) -> Option<&Atom> {
     }
 }
 
-/// Returns the requirement flag that a node needs by itself, regardless of its children. `None` if it needs
-/// no flag.
+/// Returns the requirement flag of a node, apart from the flags of its children. `None` if it needs no flag.
 fn needs(node: Node<'_>) -> Option<&'static str> {
     match node {
         Node::Preference(_) => Some("preferences"),

@@ -4,8 +4,8 @@
 //! system time, because its output is unbuffered.
 //!
 //! `cargo run --release` runs everything. With Turtle (`.ttl`) or N-Triples (`.n3`) files as arguments, it runs
-//! these. With `--write DIRECTORY`, it writes the ontologies to the directory, and in addition five
-//! universities with one RDF/XML file per department.
+//! these. With `--write DIRECTORY`, it writes the ontologies to the directory, and in addition five universities in
+//! RDF/XML, with one file for the schema and one per department.
 
 mod shapes;
 mod university;

@@ -36,8 +36,8 @@ pub struct Schema {
 }
 
 /// Computes the hierarchy of the classes and properties in `named`, except those in the namespace of OWL, from the
-/// consequences for a fresh instance of each class, and for a fresh pair of each property. If the knowledge is
-/// inconsistent, `empty` is always `None`.
+/// consequences for a fresh instance of each class, and for a fresh pair of each property. `empty` is always `None`
+/// if the rules that serve for this already derive a violation without the fresh instances.
 ///
 /// # Errors
 /// Returns an error if the evaluation of the rules exceeds its budget or is interrupted.

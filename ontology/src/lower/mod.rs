@@ -39,7 +39,8 @@ pub struct Lowered {
     /// SWRL rules of the knowledge base, then rules lowered from axioms, then the semantics of OWL's own
     /// vocabulary, then additional rules.
     pub program: Program,
-    /// Facts of the assertions, and facts of auxiliary relations, for example the members of enumerations.
+    /// Facts of the assertions, of auxiliary relations (for example the members of enumerations) and, if a rule
+    /// depends on it, of `owl:Thing`.
     pub facts: Vec<Fact>,
     /// Number of SWRL rules omitted because an equal rule occurs before, in any of the ontologies.
     pub duplicates: usize,

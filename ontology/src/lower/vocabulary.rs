@@ -1,5 +1,5 @@
-//! Semantics of OWL's own classes and properties: `owl:Thing`, `owl:Nothing`, the top and bottom properties,
-//! and `differentFrom`.
+//! Semantics of OWL's own classes and properties: `owl:Thing`, `owl:Nothing`, `owl:topObjectProperty`, the bottom
+//! properties, and `differentFrom`.
 //!
 //! Constraints forbid members of `owl:Nothing` and of the bottom properties in every knowledge base.
 //! `owl:Thing` contains every individual that the knowledge base names or describes. Its facts are derived only

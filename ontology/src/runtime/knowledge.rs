@@ -70,7 +70,7 @@ impl Runtime {
     /// Changes assertions. Returns the resulting change of all facts that hold.
     ///
     /// # Errors
-    /// Returns [`Error::Engine`] if the rules exceed their limits; the facts are then unchanged.
+    /// Returns [`Error::Engine`] with an error of [`Engine::apply`]; the facts are then unchanged.
     pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
         self.relations.extend(delta.insert.iter().map(|fact| (fact.predicate, fact.arguments.len())));
         if self.mode == Mode::Retract {

@@ -40,7 +40,7 @@ impl Individual {
     }
 }
 
-/// A design that solves a function.
+/// A function design: one way to provide a function.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FunctionDesign {
     /// The design.

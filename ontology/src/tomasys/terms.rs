@@ -1,8 +1,8 @@
 //! The vocabulary table: the IRIs of each TOMASys term in the vocabularies in use.
 //!
 //! A term may have several IRIs. Queries use all of them, and updates use the one in the vocabulary of the
-//! individual's class. A new vocabulary needs constants in `vocab` and entries here and in the lists of
-//! `mission`'s `Catalogue`. Other words for statuses are added in `change::spellings`.
+//! individual's class. A new vocabulary needs constants in `vocab` and entries here and in the lists of `mission`'s
+//! `Catalogue` and of `mapek::analyze::unavailable`. Other words for statuses are added in `change::spellings`.
 
 use crate::vocab::{mros, navigation, pddl_tomasys as www, suave, tomasys as t};
 

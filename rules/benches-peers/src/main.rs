@@ -1,8 +1,8 @@
 //! Comparison of the engine with its peers, in one run: transitive closure from scratch, and single updates
 //! of a status cascade.
 //!
-//! `cargo run --release` prints a table. Times are medians on one thread. Times from scratch are processor
-//! time (Linux). The engine also records a derivation of every fact; no peer does.
+//! `cargo run --release` prints a table. Times are medians on one thread. Times from scratch are processor time
+//! (Linux). The engine also records a derivation of every derived fact; no peer does.
 
 mod closure;
 mod updates;

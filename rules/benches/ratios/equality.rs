@@ -31,9 +31,9 @@ fn facts(symbols: &mut Symbols, names: usize) -> (Vec<Fact>, Fact) {
     (facts, pair)
 }
 
-/// The program with equality as rules: a symmetric and transitive relation (without pairs of equal names)
-/// under which every relation is closed. In rule text, `sameAs` is a special atom, so a relation with another
-/// name represents it.
+/// The program with equality as rules: a symmetric and transitive relation (without pairs of a name with itself)
+/// under which every relation is closed. In rule text, `sameAs` is a special atom, so a relation with another name
+/// represents it.
 fn by_rules(program: &Program, symbols: &mut Symbols) -> Program {
     let mut text = String::from(
         "same_as(?x, ?y) -> same_as(?y, ?x) .

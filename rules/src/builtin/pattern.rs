@@ -3,7 +3,7 @@
 //! invalid constant pattern is an error of its rule (R210). An invalid pattern in a variable makes the
 //! built-in false.
 //!
-//! [2] W3C `XQuery` 1.0 and `XPath` 2.0 Functions and Operators, 2007.
+//! [1] W3C `XQuery` 1.0 and `XPath` 2.0 Functions and Operators, 2007.
 
 use std::collections::HashSet;
 
@@ -37,7 +37,7 @@ pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
 }
 
 /// Returns the distinct parts of the first argument between matches of the second, in order of occurrence. Empty for
-/// the empty text, for invalid arguments, and for a pattern that matches the empty text ([2], section 7.6.4).
+/// the empty text, for invalid arguments, and for a pattern that matches the empty text ([1], section 7.6.4).
 pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
     let texts = arguments.iter().map(|argument| as_text(argument)).collect::<Option<Vec<&str>>>();
     let (text, pattern, flags) = match texts.as_deref() {

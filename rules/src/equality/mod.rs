@@ -10,10 +10,10 @@
 //! restated, and all equalities that still follow are derived again. This differs from [2], which
 //! over-deletes along all derivations and needs no record of equalities.
 //!
-//! To a client, every name of an individual has all facts of the individual. A literal is never equal to a
-//! name or to another literal: a pair with a literal merges nothing. It is a violation unless the two are literals
-//! whose difference is undecided. The pair of a name with itself holds only if it is stated. In rule bodies, an
-//! individual with several names is equal to itself.
+//! To a client, every name of an individual has all facts of the individual. A literal is never equal to a name or to
+//! another literal: a pair with a literal merges nothing. It is a violation unless both are literals that may be
+//! equal. The pair of a name with itself holds only if it is stated. In rule bodies, an individual with several names
+//! is equal to itself.
 //!
 //! [1] Motik, Nenov, Piro, Horrocks, "Handling owl:sameAs via rewriting", AAAI 2015.
 //! [2] Motik, Nenov, Piro, Horrocks, "Combining rewriting and incremental materialisation maintenance for Datalog

@@ -348,8 +348,8 @@ impl<'e> Update<'e> {
         );
     }
 
-    /// Merges the classes of the two names of each pair, and moves the stated facts to the rows of the
-    /// new representatives. `connect` adds the edges to the classes.
+    /// Merges the classes of the two names of each pair, and moves the stated facts to the rows of the new
+    /// representatives. `connect` adds the edges and merges the classes.
     fn join(&mut self, pairs: &[(Symbol, Symbol)], connect: impl FnOnce(&mut Classes)) {
         let classes = &self.equality.classes;
         let representatives = pairs.iter().map(|&(left, right)| (classes.find(left), classes.find(right)));

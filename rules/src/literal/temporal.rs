@@ -390,7 +390,7 @@ fn add_seconds(value: &Decimal, whole: i64) -> Decimal {
     Decimal::new(unscaled + BigInt::from(whole) * ten_to(scale), scale)
 }
 
-/// Formats a time zone, given in seconds east of UTC, as `Z` or `+hh:mm`.
+/// Formats a time zone, given in seconds east of UTC, as `Z`, `+hh:mm` or `-hh:mm`.
 pub(super) fn zone_text(zone: i64) -> String {
     let (sign, minutes) = (if zone < 0 { '-' } else { '+' }, zone.abs() / 60);
     if zone == 0 { "Z".into() } else { format!("{sign}{:02}:{:02}", minutes / 60, minutes % 60) }

@@ -35,8 +35,8 @@ pub struct Syntax {
 /// ```
 ///
 /// # Errors
-/// Returns the errors of the text: R101, R102, R104. After the first error in a rule, the text up to the next full
-/// stop, label or prefix declaration is not checked.
+/// Returns the errors of the text: R101, R102, R104. After the first error in a rule, the parser skips the text up to
+/// the next full stop, label or prefix declaration.
 pub fn parse_rules(
     text: &str,
     source: &str,

@@ -114,7 +114,7 @@ impl Knowledge {
     /// Creates knowledge without rules from all facts of a proof, both asserted and inferred.
     ///
     /// # Errors
-    /// A fact refers to a symbol that is not in `symbols`.
+    /// A fact has a symbol that is not in `symbols`, or more than 32 arguments.
     pub fn closed(symbols: Symbols, facts: Vec<Fact>, equality: bool) -> Result<Self, Errors> {
         let program = Program { rules: Vec::new(), equality };
         let engine = Engine::new(symbols, program, facts)
@@ -262,8 +262,8 @@ impl Knowledge {
         }
     }
 
-    /// Returns the change of facts of a successful update, after applying the change to the cached
-    /// designs, actions and measured values. Converts an error to a message.
+    /// Returns the change of facts of a successful update, after applying the change to the cache of queries.
+    /// Converts an error to a message.
     fn changed(&mut self, outcome: Result<Delta, ontology::Error>) -> Result<Delta, Message> {
         let delta = outcome.map_err(|error| Message::from_ontology(&error))?;
         self.follow(&delta);
@@ -473,8 +473,8 @@ impl Knowledge {
     /// warnings, which are also added to [`Knowledge::warnings`].
     ///
     /// # Errors
-    /// All errors of the documents, a retracted anonymous individual, or exceeded limits of
-    /// inference. The knowledge is then unchanged.
+    /// Errors of the documents, a retracted anonymous individual, or exceeded limits of inference. The knowledge is
+    /// then unchanged.
     pub fn revise(&mut self, asserted: &[PathBuf], retracted: &[PathBuf]) -> Result<Vec<Message>, Errors> {
         let read = self.documented.change(asserted, retracted, self.runtime.engine_mut());
         let change = read.map_err(|errors| {

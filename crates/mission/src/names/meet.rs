@@ -34,7 +34,7 @@ pub(crate) struct Meeting {
 }
 
 /// Warning that the problem declares some designs, but not all that the knowledge base has for the functions named in
-/// the problem. Contains the IRI of the first missing design, and the text.
+/// the problem (if it names none, for any function). Contains the IRI of the first missing design, and the text.
 ///
 /// `None` if no design is missing, or if another message already lists the missing designs. Such a message appears if
 /// the problem declares unknown designs, or if a required function has no design.

@@ -264,8 +264,8 @@ impl CoAdaptation {
     }
 
     /// For each quality bound, adds facts to the problem for the designs that meet it. A design that lacks an
-    /// estimate still meets the bound if no design of its functions has an estimate of the attribute. Adds the values
-    /// for changes of designs that the bindings do not add.
+    /// estimate still meets the bound if no design of the required functions that it solves has an estimate of the
+    /// attribute. Adds the values for changes of designs that the bindings do not add.
     pub(super) fn fill(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
         self.fill_changes(problem, designs);
         for quality in self.quality() {

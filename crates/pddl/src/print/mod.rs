@@ -1,7 +1,7 @@
 //! Prints syntax trees as PDDL. Parsing the printed text and printing it again yields the same text.
 //!
-//! Empty sections other than `:init` and `:goal`, and empty preconditions, are omitted, because several
-//! planners reject them.
+//! Empty sections other than `:init` and `:goal`, and empty preconditions of instantaneous actions, are omitted,
+//! because several planners reject them.
 
 mod layout;
 mod soft;

@@ -1,8 +1,8 @@
 //! Numeric trace of a plan: the new values of functions at each start and end of an action, and the bounds
 //! that conditions impose.
 //!
-//! Used for charts of plans that [`validate`](super::validate()) has accepted. Effects are applied by the
-//! same rules; conditions are not checked again.
+//! Used for charts of plans that [`validate`](super::validate()) has accepted. Effects are applied by the same rules;
+//! conditions are not enforced.
 
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;
@@ -46,8 +46,8 @@ pub struct CourseMoment {
     /// Bounds on numeric functions that the action's conditions impose at this moment. The bounds at the start
     /// include those of the over-all conditions.
     pub bounds: Vec<NumberBound>,
-    /// Metric value if the plan ended now. `None` without a metric or if the value is undefined. For example,
-    /// a metric that counts violated preferences is undefined before the end.
+    /// Metric value if the plan ended now, with the present time as `total-time`. `None` without a metric or if the
+    /// value is undefined; a metric that counts violated preferences is always undefined here.
     pub metric: Option<BigRational>,
 }
 

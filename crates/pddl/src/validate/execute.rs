@@ -303,9 +303,9 @@ impl<'e, 'p> Execution<'e, 'p> {
         Ok(changes)
     }
 
-    /// Applies the changes of a happening to the state. Recomputes the derived facts if a changed
-    /// predicate or function occurs in a condition of an axiom. Returns a violation if an increased or
-    /// scaled function has no value, or if its new value is too large.
+    /// Applies the changes of a happening to the state. Recomputes the derived facts if a changed predicate or
+    /// function occurs in a condition of an axiom. Returns a violation if an increased, decreased or scaled function
+    /// has no value, or if its new value is too large.
     pub(super) fn apply(
         &mut self,
         step: &Step<'p>,
