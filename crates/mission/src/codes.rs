@@ -191,7 +191,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M228",
         "A reconfiguration cannot be counted at this position.",
-        "A function bound to `reconfigured:ATTRIBUTE` occurs in a duration, a condition, or an effect other than `increase` and `decrease`.",
+        "A function bound to `reconfigured:ATTRIBUTE` occurs in a duration, a condition, or an effect other than `increase` and `decrease`, or its amount is not linear (a product of two such functions, or a divisor).",
         "Add it to a number in an effect, as in `(increase (total-cost) (reconfiguration))`, and use this number in the metric.",
     ],
     [

@@ -146,7 +146,8 @@ impl CoAdaptation {
             for function in action.into_iter().flat_map(|action| self.not_counted(action)) {
                 let text = format!(
                     "`{name}` uses `({function})` where reconfigurations cannot be counted; use it in `increase` or \
-                     `decrease`, outside of `when` and `forall`"
+                     `decrease`, outside of `when` and `forall`, and neither in a product with such a function nor in \
+                     a divisor"
                 );
                 errors.push(Message::error("M228", text));
             }
@@ -173,9 +174,10 @@ impl CoAdaptation {
 
     fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
         let uncounted = RefCell::new(BTreeSet::new());
+        let is_counted = |name: &Name| self.changed.contains_key(name);
         let see = |part: &mut Expression| {
             if let Expression::Fluent(fluent) = part
-                && self.changed.contains_key(&fluent.predicate.name)
+                && is_counted(&fluent.predicate.name)
             {
                 uncounted.borrow_mut().insert(fluent.predicate.name.clone());
             }
@@ -183,7 +185,7 @@ impl CoAdaptation {
         match action.body.clone() {
             ActionBody::Instantaneous { mut precondition, effect } => {
                 precondition.change_leaves(&mut |leaf| see(leaf));
-                walk_uncounted(effect, &see);
+                walk_uncounted(effect, &is_counted, &see);
             }
             ActionBody::Durative { duration, conditions, effects } => {
                 for mut constraint in duration {
@@ -193,7 +195,7 @@ impl CoAdaptation {
                     condition.change_leaves(&mut |leaf| see(leaf));
                 }
                 for (_, effect) in effects {
-                    walk_uncounted(effect, &see);
+                    walk_uncounted(effect, &is_counted, &see);
                 }
             }
         }
