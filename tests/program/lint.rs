@@ -115,6 +115,15 @@ fn functions_of_positions_exist() {
     assert!(outcome.stdout.contains("`up`") && outcome.stdout.contains("2 errors,"), "{}", outcome.stdout);
 }
 
+/// By default, only a function of designs gets the values of the attribute that has its name.
+#[test]
+fn functions_of_places_may_have_names_of_attributes() {
+    for functions in ["(needed_light ?place - place)", "(fd_needed_light ?place - (either place item))"] {
+        let functions = format!("(:functions {functions}");
+        check(&[("domain.pddl", "(:functions", &functions)], 0, &["no problems found"]);
+    }
+}
+
 #[test]
 fn missing_and_negative_numbers_are_warnings() {
     let misspelt = (

@@ -11,6 +11,7 @@ use num_rational::BigRational;
 
 use ontology::tomasys::{Individual, View};
 use ontology::vocab::local_name;
+use pddl::TypeHierarchy;
 use pddl::ast::{
     Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
     TypedName,
@@ -272,7 +273,7 @@ pub(super) fn fill(
         }
     }
     for declared in &domain.functions {
-        fill.values(declared, &bindings.function(declared));
+        fill.values(domain, declared, bindings);
     }
     fill.warnings
 }
@@ -395,15 +396,31 @@ impl Fill<'_> {
         }
     }
 
-    fn values(&mut self, declared: &Declaration, query: &Query) {
-        let name = &declared.identifier.name;
+    /// Returns the names of the objects that are arguments of a parameter with this type.
+    fn fitting(&self, domain: &Domain, r#type: &TypeExpression) -> HashSet<Name> {
+        let hierarchy = TypeHierarchy::of(domain);
+        let objects = domain.constants.iter().chain(&self.problem.objects);
+        let fitting = objects.filter(|object| hierarchy.fits(&object.r#type, r#type));
+        fitting.map(|object| object.identifier.name.clone()).collect()
+    }
+
+    fn values(&mut self, domain: &Domain, declared: &Declaration, bindings: &Bindings) {
+        let (name, query) = (&declared.identifier.name, bindings.function(declared));
         let mut values: Vec<(Vec<String>, BigRational)> = Vec::new();
-        match query {
+        match &query {
             Query::Estimation(attribute) if declared.parameters.len() == 1 => {
                 let plain = attribute.strip_prefix("fd_").unwrap_or(attribute);
                 for design in self.known.designs() {
                     let value = design.estimations.get(attribute).or_else(|| design.estimations.get(plain));
                     values.extend(value.map(|value| (vec![design.individual.name.clone()], value.clone())));
+                }
+                // By default, a function is bound to the attribute of its name. Without the type of designs it is
+                // another function, for example of places.
+                if !values.is_empty() && !bindings.own.contains_key(name) {
+                    let fitting = self.fitting(domain, &declared.parameters[0].r#type);
+                    values.retain(|(arguments, _)| {
+                        arguments.iter().all(|argument| fitting.contains(&Name::new(argument)))
+                    });
                 }
             }
             Query::Measured(attribute) if declared.parameters.is_empty() => {
