@@ -349,6 +349,30 @@ fn observations_that_violate_a_guard_are_used() {
     assert_eq!(plan["steps"].as_array().map(Vec::len), Some(1), "{plan}");
 }
 
+/// A domain in this form uses the names of the knowledge base. Entries that map other names, and bindings to
+/// queries, would have no effect and are refused at their position.
+#[test]
+fn bindings_without_effect_are_refused() {
+    let texts = texts(1);
+    let directory = tempfile::tempdir().expect("a directory");
+    let input = texts.write(directory.path());
+    let (status, _, stderr) = metaplan(&input.arguments("plan", &["--name", "nobody=i1"]));
+    assert!(status == 3 && stderr.contains("M234") && stderr.contains("`--name nobody=i1`"), "{stderr}");
+    let manifest = directory.path().join("mission.toml");
+    let path = manifest.to_str().expect("UTF-8");
+    let files = "name = \"m\"\n[knowledge]\nfiles = [\"kb.ofn\"]\n[planning]\ndomain = \"domain.pddl\"\n\
+                 problem = \"problem.pddl\"\n";
+    for (section, words) in [
+        ("[bindings.names]\nnobody = \"i1\"\n", &["M234", "mission.toml:8:"][..]),
+        ("[bindings]\neffort = \"estimation:start\"\n", &["M234", "`effort` is bound"]),
+    ] {
+        std::fs::write(&manifest, format!("{files}{section}")).expect("the manifest is written");
+        let (status, stdout, _) = metaplan(&["lint", path]);
+        let has_words = words.iter().all(|word| stdout.contains(word));
+        assert!(status == 3 && has_words, "{section}: {stdout}");
+    }
+}
+
 /// The public domain, with an inferred predicate instead of a class in one condition, has the same optimum as
 /// its export, and a valid certificate.
 #[test]

@@ -97,6 +97,19 @@ impl Bindings {
         &self.written
     }
 
+    /// Returns errors for the entries that a domain in PLANTA's form cannot use, because it is filled by the names of the
+    /// ontology: all entries of `[bindings.names]`, and all bindings except to `solves` and `available`.
+    pub(super) fn unused_in_planta(&self) -> Vec<Message> {
+        let reason = "the domain is in PLANTA's form, which uses the names of the knowledge base";
+        let text = format!("{reason}; remove the entry, or rename the individual or the object");
+        let names = self.names.entries().iter().map(|entry| entry.wrong("M234", &text));
+        let is_used = |query: &Query| matches!(query, Query::Solves | Query::Available);
+        let bound = self.own.iter().filter(|(_, query)| !is_used(query)).map(|(symbol, _)| {
+            Message::error("M234", format!("`{symbol}` is bound, but {reason}; remove the binding"))
+        });
+        names.chain(bound).collect()
+    }
+
     /// Returns the predicates that state which design solves which function: explicitly bound ones and the
     /// default names, declared or not.
     pub fn solves(&self) -> Vec<Name> {

@@ -92,11 +92,16 @@ impl Mission {
             }
         };
         let (mut domain, mut problem, mut warnings) = (domain, problem, warnings);
-        let planta = knowledge.as_ref().and_then(|knowledge| {
-            let (planta, completed, more) = Planta::new(knowledge.terms()?, &domain, &mut problem);
+        let terms = knowledge.as_ref().and_then(Knowledge::terms);
+        let unused = terms.map_or_else(Vec::new, |_| bindings.unused_in_planta());
+        if !unused.is_empty() {
+            return Err(unused.into());
+        }
+        let planta = terms.map(|terms| {
+            let (planta, completed, more) = Planta::new(terms, &domain, &mut problem);
             domain = completed;
             warnings.extend(more);
-            Some(planta)
+            planta
         });
         let (problem_designs, never_named) = match &mut knowledge {
             // PLANTA's form completes the domain with the names of the knowledge base, so no names
