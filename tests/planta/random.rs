@@ -373,6 +373,43 @@ fn bindings_without_effect_are_refused() {
     }
 }
 
+/// A domain that declares all its `inferred-…` predicates gets no axioms. A predicate that stays empty causes a
+/// warning, but not one with facts, effects or axioms of the PDDL files.
+#[test]
+fn declared_conclusions_without_facts_are_reported() {
+    let head = "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x)";
+    let declared = "(inferred-Ca ?x) (inferred-Cb ?x)";
+    let action = |effect: &str| {
+        format!(
+            "(:action a :parameters (?x) :precondition (and (inferred-Ca ?x) (inferred-Cb ?x)) :effect {effect}))\n"
+        )
+    };
+    let done = action("(done ?x)");
+    let axiom = "(:derived (inferred-Ca ?x) (done ?x))";
+    for (domain, init, reported) in [
+        (format!("{head} {declared})\n {done}"), "", &["`inferred-Ca`", "`inferred-Cb`"][..]),
+        (format!("{head} {declared})\n {done}"), "(inferred-Ca i1)", &["`inferred-Cb`"]),
+        (format!("{head} {declared})\n {axiom} {done}"), "(inferred-Cb i1)", &[]),
+        (
+            format!("{head} {declared})\n {}", action("(and (done ?x) (inferred-Ca ?x))")),
+            "",
+            &["`inferred-Cb`"],
+        ),
+        (format!("{head} (inferred-Ca ?x))\n {done}"), "", &[]),
+    ] {
+        let problem =
+            format!("(define (problem p) (:domain d) (:objects i1) (:init {init}) (:goal (done i1)))\n");
+        let knowledge = knowledge("ClassAssertion(:Ca :i1) ClassAssertion(:Cb :i1)\n");
+        let directory = tempfile::tempdir().expect("a directory");
+        let input = Texts { knowledge, domain, problem }.write(directory.path());
+        let (_, stdout, stderr) = metaplan(&input.arguments("lint", &[]));
+        assert_eq!(stdout.matches("M215").count(), reported.len(), "{stdout}{stderr}");
+        for name in reported {
+            assert!(stdout.contains(name) && stdout.contains("domain.pddl:2:"), "{name}: {stdout}");
+        }
+    }
+}
+
 /// The public domain, with an inferred predicate instead of a class in one condition, has the same optimum as
 /// its export, and a valid certificate.
 #[test]

@@ -175,6 +175,11 @@ impl Bindings {
         self.predicate(predicate) == Some(Query::Available)
     }
 
+    /// Returns `true` if a predicate is bound to a query, explicitly or by default.
+    pub(super) fn is_bound_predicate(&self, predicate: &Name) -> bool {
+        self.predicate(predicate).is_some()
+    }
+
     pub(super) fn is_measured(&self, declared: &Declaration, attribute: &str) -> bool {
         let query = self.function(declared);
         declared.parameters.is_empty() && matches!(query, Query::Measured(name) if name == attribute)

@@ -143,8 +143,8 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M215",
         "A predicate of a template has no conclusions.",
-        "The domain uses an `inferred-…` predicate for which the knowledge base has no property or class.",
-        "Correct the name, or use a knowledge base that defines it.",
+        "The domain uses an `inferred-…` predicate for which the knowledge base has no property or class, or it declares all of these predicates itself, so that the axioms of the knowledge base are not added.",
+        "Correct the name, use a knowledge base that defines it, or remove the declarations.",
     ],
     [
         "M221",
