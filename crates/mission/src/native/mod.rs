@@ -22,6 +22,7 @@ mod walk;
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 
 use num_rational::BigRational;
 use num_traits::Zero as _;
@@ -494,8 +495,23 @@ fn has_parameter(action: &Action, name: &Name) -> bool {
     action.parameters.iter().any(|parameter| parameter.identifier.name == *name)
 }
 
+/// Returns the name of the predicate of the designs that meet a quality bound. Characters that PDDL does not allow, for
+/// example in the IRI of an anonymous bound, are replaced by their hexadecimal codes between dots.
 fn meets(quality: &Quality) -> Name {
-    Name::new(&format!("fd_meets_{}", quality.individual.name))
+    let name = &quality.individual.name;
+    // Only a replaced name begins with a dot, and its dots are replaced, so that different names remain different.
+    if is_pddl_name(name) && !name.starts_with('.') {
+        return Name::new(&format!("fd_meets_{name}"));
+    }
+    let mut replaced = String::from("fd_meets_.");
+    for c in name.chars() {
+        if c.is_ascii_alphanumeric() || "-_".contains(c) {
+            replaced.push(c);
+        } else {
+            let _ = write!(replaced, ".{:x}.", u32::from(c));
+        }
+    }
+    Name::new(&replaced)
 }
 
 /// Returns the name of the numeric function that has the value of an attribute for a design.
