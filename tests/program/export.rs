@@ -124,6 +124,20 @@ fn bounds_with_names_outside_of_pddl_are_exported() {
     }
 }
 
+/// PDDL files may not have numbers of more than 400 digits, so the knowledge base may not have them either.
+#[test]
+fn values_with_too_many_digits_are_refused() {
+    let old = ":grasp_time ; t:hasValue 4.0";
+    for (digits, status) in [(400, 0), (401, 3)] {
+        let directory = warehouse(old, &format!(":grasp_time ; t:hasValue {}", "4".repeat(digits)));
+        let outcome =
+            metaplan_in(directory.path(), &["export", "m/mission.toml", "--to", "pddl", "-o", "out"], "");
+        assert_eq!(outcome.status, status, "{outcome:#?}");
+        let words = ["P105", "`(fd_grasp_time fd_suction)` has more than 400 digits"];
+        assert!(status == 0 || words.iter().all(|word| outcome.stderr.contains(word)), "{outcome:#?}");
+    }
+}
+
 #[test]
 fn unwritable_targets_are_reported() {
     let directory = tempfile::tempdir().expect("a temporary directory");

@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashSet};
 use std::sync::{Arc, OnceLock};
 
-use pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
+use pddl::ast::{Atom, Condition, Direction, Domain, InitialElement, Metric, Name, Problem, Span, Term};
 use pddl::{self, Severity, Source};
 use tracing::info_span;
 
@@ -207,6 +207,7 @@ impl Mission {
         let _span = info_span!("fill").entered();
         let mut problem = self.problem.clone();
         let mut warnings = self.fill(&mut problem);
+        warnings.extend(unreadable_values(&problem));
         if warnings.iter().any(Message::is_error) {
             return Err(warnings.into());
         }
@@ -221,7 +222,7 @@ impl Mission {
         // Contributions of settings and of the knowledge base have no source location. Messages
         // about them must not point into a file.
         let (contributed, located): (Vec<_>, Vec<_>) =
-            errors.into_iter().partition(|diagnostic| diagnostic.span == pddl::ast::Span::default());
+            errors.into_iter().partition(|diagnostic| diagnostic.span == Span::default());
         let mut messages = Message::from_pddl(&located, &sources);
         if self.planta.is_some() && messages.iter().any(|message| message.code == "P134") {
             messages.retain(|message| message.code != "P134");
@@ -318,6 +319,26 @@ fn joined_names(
     }
     warnings.extend(more);
     Ok((problem_designs, never_named))
+}
+
+/// Returns errors for the values of settings and of the knowledge base that PDDL files, for example those of a
+/// certificate, cannot contain, because they have too many digits.
+fn unreadable_values(problem: &Problem) -> Vec<Message> {
+    let unreadable = problem.init.iter().filter_map(|element| match element {
+        InitialElement::Value(atom, value, span) if *span == Span::default() => {
+            (!pddl::is_readable(value)).then_some(atom)
+        }
+        _ => None,
+    });
+    let error = |atom: &Atom| {
+        let arguments: String = atom.arguments.iter().map(|term| format!(" {}", term.name())).collect();
+        let text = format!(
+            "the value of `({}{arguments})` has more than 400 digits (from a setting or from the knowledge base)",
+            atom.predicate.name
+        );
+        Message::error("P105", text).with_help("write fewer digits")
+    };
+    unreadable.map(error).collect()
 }
 
 fn parse(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Message>), Errors> {
