@@ -373,6 +373,21 @@ fn bindings_without_effect_are_refused() {
     }
 }
 
+/// If the knowledge base has no designs, a missing plan is not explained with designs.
+#[test]
+fn designs_are_not_mentioned_if_there_are_none() {
+    let domain = "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x))
+ (:action b :parameters (?x) :precondition (inferred-Ca ?x) :effect (done ?x)))\n"
+        .to_owned();
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i2)))\n".to_owned();
+    let directory = tempfile::tempdir().expect("a directory");
+    let knowledge = knowledge("ClassAssertion(:Ca :i1)\n");
+    let input = Texts { knowledge, domain, problem }.write(directory.path());
+    let (status, stdout, stderr) = metaplan(&input.arguments("plan", &[]));
+    assert!(status == 10 && stdout.contains("no plan exists"), "{stdout}{stderr}");
+    assert!(!stdout.contains("designs") && !stderr.contains("designs"), "{stdout}{stderr}");
+}
+
 /// A domain that declares all its `inferred-…` predicates gets no axioms. A predicate that stays empty causes a
 /// warning, but not one with facts, effects or axioms of the PDDL files.
 #[test]

@@ -91,6 +91,23 @@ fn unused_names_are_warnings() {
     );
 }
 
+/// A message about a name or object of the knowledge base explains where it comes from, and does not point to a
+/// declaration that is in no file.
+#[test]
+fn contributions_of_the_knowledge_base_are_explained() {
+    check(
+        &[("problem.pddl", ":metric minimize (total-time)", ":metric minimize (grasp_time)")],
+        3,
+        &["P122", "`grasp_time` is a sum over the designs", "problem.pddl:32:22", "in effects"],
+    );
+    let outcome = check(
+        &[("problem.pddl", "box vase - item", "box vase f_grasp - item")],
+        3,
+        &["P127", "the object `f_grasp` is a constant of another type", "problem.pddl:10:"],
+    );
+    assert!(!outcome.stdout.contains("domain.pddl:1:1"), "{outcome:#?}");
+}
+
 #[test]
 fn functions_of_positions_exist() {
     let positions = |names: &str| {
