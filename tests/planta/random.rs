@@ -357,14 +357,14 @@ fn bindings_without_effect_are_refused() {
     let directory = tempfile::tempdir().expect("a directory");
     let input = texts.write(directory.path());
     let (status, _, stderr) = metaplan(&input.arguments("plan", &["--name", "nobody=i1"]));
-    assert!(status == 3 && stderr.contains("M234") && stderr.contains("`--name nobody=i1`"), "{stderr}");
+    assert!(status == 3 && stderr.contains("M236") && stderr.contains("`--name nobody=i1`"), "{stderr}");
     let manifest = directory.path().join("mission.toml");
     let path = manifest.to_str().expect("UTF-8");
     let files = "name = \"m\"\n[knowledge]\nfiles = [\"kb.ofn\"]\n[planning]\ndomain = \"domain.pddl\"\n\
                  problem = \"problem.pddl\"\n";
     for (section, words) in [
-        ("[bindings.names]\nnobody = \"i1\"\n", &["M234", "mission.toml:8:"][..]),
-        ("[bindings]\neffort = \"estimation:start\"\n", &["M234", "`effort` is bound"]),
+        ("[bindings.names]\nnobody = \"i1\"\n", &["M236", "mission.toml:8:"][..]),
+        ("[bindings]\neffort = \"estimation:start\"\n", &["M236", "`effort` is bound"]),
     ] {
         std::fs::write(&manifest, format!("{files}{section}")).expect("the manifest is written");
         let (status, stdout, _) = metaplan(&["lint", path]);

@@ -102,10 +102,10 @@ impl Bindings {
     pub(super) fn unused_in_planta(&self) -> Vec<Message> {
         let reason = "the domain is in PLANTA's form, which uses the names of the knowledge base";
         let text = format!("{reason}; remove the entry, or rename the individual or the object");
-        let names = self.names.entries().iter().map(|entry| entry.wrong("M234", &text));
+        let names = self.names.entries().iter().map(|entry| entry.wrong("M236", &text));
         let is_used = |query: &Query| matches!(query, Query::Solves | Query::Available);
         let bound = self.own.iter().filter(|(_, query)| !is_used(query)).map(|(symbol, _)| {
-            Message::error("M234", format!("`{symbol}` is bound, but {reason}; remove the binding"))
+            Message::error("M236", format!("`{symbol}` is bound, but {reason}; remove the binding"))
         });
         names.chain(bound).collect()
     }

@@ -207,7 +207,7 @@ pub const CODES: &[[&str; 4]] = &[
         "Remove the binding if the function is a variable of the problem, and otherwise the value.",
     ],
     [
-        "M234",
+        "M236",
         "A domain in PLANTA's form does not use a binding.",
         "`[bindings]`, `[bindings.names]` or `--name` has an entry, but such a domain uses the names of the knowledge base.",
         "Remove the entry. Rename the individual or the object if their names differ.",
