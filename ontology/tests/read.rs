@@ -261,6 +261,10 @@ fn malformed_documents_are_errors_with_a_place() {
             &["f:3:18: error[O102]: not well-formed functional"],
         ),
         (
+            &format!("Prefix(:=<http://e/#>)\nOntology(<http://e/>\n{}ClassAssertion(:C))", "\n".repeat(9)),
+            &["f:12:18: error[O102]: not well-formed functional-style syntax: expected Individual"],
+        ),
+        (
             "<Ontology xmlns=\"http://www.w3.org/2002/07/owl#\"><Declaration>",
             &["f:1:63: error[O102]: not well-formed OWL/XML"],
         ),

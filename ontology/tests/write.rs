@@ -187,6 +187,32 @@ fn xml_that_is_not_well_formed_is_not_written() {
     }
 }
 
+/// The readers of the functional-style syntax accept only literals and variables as arguments of data properties.
+#[test]
+fn rules_that_readers_refuse_are_not_written() {
+    let atom = "[ a swrl:ClassAtom ; swrl:classPredicate :C ; swrl:argument1 :x ]";
+    let text = |subject: &str| {
+        format!(
+            ":i a owl:NamedIndividual . [ a swrl:Imp ; swrl:head ( {atom} ) ; swrl:body ( {atom} \
+            [ a swrl:DatavaluedPropertyAtom ; swrl:propertyPredicate :d ; swrl:argument1 {subject} ; swrl:argument2 1 ] ) ] ."
+        )
+    };
+    for syntax in ALL {
+        let text_of_rule = written(&text(":x"), syntax).expect("writable");
+        read_text(&text_of_rule, "again", &ReadOptions::default()).expect("readable");
+        match (syntax, written(&text(":i"), syntax)) {
+            (OutputSyntax::Functional | OutputSyntax::OwlXml, outcome) => {
+                let error = outcome.expect_err("not readable");
+                let atom = "DataPropertyAtom(<http://e.org/#d> <http://e.org/#i>";
+                assert!(error.contains("O111") && error.contains(atom), "{syntax:?}: {error}");
+            }
+            (_, outcome) => {
+                read_text(&outcome.expect("writable"), "again", &ReadOptions::default()).expect("readable");
+            }
+        }
+    }
+}
+
 #[test]
 fn carriage_returns_survive_conversion() {
     for syntax in ALL {

@@ -99,10 +99,18 @@ pub(super) fn write_with(
     let Contents { mission, problem, task, solution, plan } = *contents;
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
     let name = directory.display().to_string();
-    let certificate = task.certify(solution, limits).map_err(|reason| wrong(&reason))?;
+    let mut certificate = task.certify(solution, limits).map_err(|reason| wrong(&reason))?;
     let (domain_text, problem_text) = (print_domain(mission.domain()), print_problem(problem));
-    let witness = compared((&domain_text, &problem_text), &certificate.task, limits)
-        .map_err(|reason| wrong(&reason))?;
+    let mut witness = compared((&domain_text, &problem_text), &certificate.task, limits);
+    if witness.is_err()
+        && let Some(reduced) = certificate.of_false_goal()
+    {
+        let witness_of_goal = compared((&domain_text, &problem_text), &reduced.task, limits);
+        if witness_of_goal.is_ok() {
+            (certificate, witness) = (reduced, witness_of_goal);
+        }
+    }
+    let witness = witness.map_err(|reason| wrong(&reason))?;
     let mut files = vec![
         (DOMAIN, domain_text),
         (PROBLEM, problem_text),

@@ -46,13 +46,16 @@ impl fmt::Display for Blocking {
 }
 
 /// Explains why an unsolvable problem has no plan. The problem was returned by [`Mission::filled`]. Returns `None` if
-/// the mission has no knowledge base, or if planning cannot decide within the limits.
+/// the mission has no knowledge base with designs, or if planning cannot decide within the limits.
 pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option<Blocking> {
     let mut config = config.clone();
     // A limit on the number of steps would hide longer plans.
     config.horizon = None;
     let config = &config;
     let designs = mission.knowledge()?.view().function_designs();
+    if designs.is_empty() {
+        return None;
+    }
     let missing: Vec<String> =
         designs.into_iter().filter(|design| !design.available).map(|design| design.individual.name).collect();
     let mut blocking = missing.clone();

@@ -349,6 +349,82 @@ fn observations_that_violate_a_guard_are_used() {
     assert_eq!(plan["steps"].as_array().map(Vec::len), Some(1), "{plan}");
 }
 
+/// A domain in this form uses the names of the knowledge base. Entries that map other names, and bindings to
+/// queries, would have no effect and are refused at their position.
+#[test]
+fn bindings_without_effect_are_refused() {
+    let texts = texts(1);
+    let directory = tempfile::tempdir().expect("a directory");
+    let input = texts.write(directory.path());
+    let (status, _, stderr) = metaplan(&input.arguments("plan", &["--name", "nobody=i1"]));
+    assert!(status == 3 && stderr.contains("M236") && stderr.contains("`--name nobody=i1`"), "{stderr}");
+    let manifest = directory.path().join("mission.toml");
+    let path = manifest.to_str().expect("UTF-8");
+    let files = "name = \"m\"\n[knowledge]\nfiles = [\"kb.ofn\"]\n[planning]\ndomain = \"domain.pddl\"\n\
+                 problem = \"problem.pddl\"\n";
+    for (section, words) in [
+        ("[bindings.names]\nnobody = \"i1\"\n", &["M236", "mission.toml:8:"][..]),
+        ("[bindings]\neffort = \"estimation:start\"\n", &["M236", "`effort` is bound"]),
+    ] {
+        std::fs::write(&manifest, format!("{files}{section}")).expect("the manifest is written");
+        let (status, stdout, _) = metaplan(&["lint", path]);
+        let has_words = words.iter().all(|word| stdout.contains(word));
+        assert!(status == 3 && has_words, "{section}: {stdout}");
+    }
+}
+
+/// If the knowledge base has no designs, a missing plan is not explained with designs.
+#[test]
+fn designs_are_not_mentioned_if_there_are_none() {
+    let domain = "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x))
+ (:action b :parameters (?x) :precondition (inferred-Ca ?x) :effect (done ?x)))\n"
+        .to_owned();
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i2)))\n".to_owned();
+    let directory = tempfile::tempdir().expect("a directory");
+    let knowledge = knowledge("ClassAssertion(:Ca :i1)\n");
+    let input = Texts { knowledge, domain, problem }.write(directory.path());
+    let (status, stdout, stderr) = metaplan(&input.arguments("plan", &[]));
+    assert!(status == 10 && stdout.contains("no plan exists"), "{stdout}{stderr}");
+    assert!(!stdout.contains("designs") && !stderr.contains("designs"), "{stdout}{stderr}");
+}
+
+/// A domain that declares all its `inferred-…` predicates gets no axioms. A predicate that stays empty causes a
+/// warning, but not one with facts, effects or axioms of the PDDL files.
+#[test]
+fn declared_conclusions_without_facts_are_reported() {
+    let head = "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x)";
+    let declared = "(inferred-Ca ?x) (inferred-Cb ?x)";
+    let action = |effect: &str| {
+        format!(
+            "(:action a :parameters (?x) :precondition (and (inferred-Ca ?x) (inferred-Cb ?x)) :effect {effect}))\n"
+        )
+    };
+    let done = action("(done ?x)");
+    let axiom = "(:derived (inferred-Ca ?x) (done ?x))";
+    for (domain, init, reported) in [
+        (format!("{head} {declared})\n {done}"), "", &["`inferred-Ca`", "`inferred-Cb`"][..]),
+        (format!("{head} {declared})\n {done}"), "(inferred-Ca i1)", &["`inferred-Cb`"]),
+        (format!("{head} {declared})\n {axiom} {done}"), "(inferred-Cb i1)", &[]),
+        (
+            format!("{head} {declared})\n {}", action("(and (done ?x) (inferred-Ca ?x))")),
+            "",
+            &["`inferred-Cb`"],
+        ),
+        (format!("{head} (inferred-Ca ?x))\n {done}"), "", &[]),
+    ] {
+        let problem =
+            format!("(define (problem p) (:domain d) (:objects i1) (:init {init}) (:goal (done i1)))\n");
+        let knowledge = knowledge("ClassAssertion(:Ca :i1) ClassAssertion(:Cb :i1)\n");
+        let directory = tempfile::tempdir().expect("a directory");
+        let input = Texts { knowledge, domain, problem }.write(directory.path());
+        let (_, stdout, stderr) = metaplan(&input.arguments("lint", &[]));
+        assert_eq!(stdout.matches("M215").count(), reported.len(), "{stdout}{stderr}");
+        for name in reported {
+            assert!(stdout.contains(name) && stdout.contains("domain.pddl:2:"), "{name}: {stdout}");
+        }
+    }
+}
+
 /// The public domain, with an inferred predicate instead of a class in one condition, has the same optimum as
 /// its export, and a valid certificate.
 #[test]

@@ -63,6 +63,38 @@ fn unsolvability_has_a_certificate() {
     }
 }
 
+/// If grounding finds the goal unreachable, the task is not completely pruned: it may lack an operator for an action
+/// that adds atoms which hold always, or that changes a number which nothing reads.
+#[test]
+fn unreachable_goals_have_certificates() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let always = "(:predicates (done ?x) (at ?x) (cb ?x) (cd ?x) (dpa ?x ?y) (pa ?x ?y))
+      (:derived (cb ?x) (exists (?y) (dpa ?x ?y)))
+      (:derived (dpa ?x ?y) (pa ?x ?y))
+      (:action a1 :parameters (?x) :precondition (at ?x) :effect (done ?x))
+      (:action a2 :parameters (?x ?y) :precondition (exists (?q) (cb ?y)) :effect (and (pa ?y ?x) (at ?x)))";
+    let unread = "(:predicates (cb ?x) (cc ?x) (cd ?x) (ce ?x)) (:functions (total-cost))
+      (:derived (cc ?x) (ce ?x))
+      (:derived (ce ?x) (cb ?x))
+      (:action a0 :parameters (?x ?y) :precondition (and) :effect (and (cb ?x) (increase (total-cost) 0)))
+      (:action a2 :parameters (?x ?y) :precondition (cc ?x) :effect (increase (total-cost) 3))";
+    for (name, body, init) in
+        [("always", always, "(at i0) (pa i0 i0)"), ("unread", unread, "(= (total-cost) 0)")]
+    {
+        let domain = format!("(define (domain d) {body})");
+        let problem =
+            format!("(define (problem p) (:domain d) (:objects i0 o0) (:init {init}) (:goal (cd o0)))");
+        std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
+        std::fs::write(directory.path().join("p.pddl"), problem).expect("a file");
+        let arguments = ["plan", "d.pddl", "p.pddl", "--certificate", name];
+        let planned = metaplan_in(directory.path(), &arguments, "");
+        assert!(planned.status == 10 && !planned.stderr.contains("M120"), "{planned:#?}");
+        let outcome = verify_in(directory.path(), &[name]);
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+        assert!(outcome.stdout.contains("verified: there is no plan"), "{outcome:#?}");
+    }
+}
+
 #[test]
 fn fronts_have_certificates() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -113,12 +113,23 @@ fn design_change_costs_are_counted_or_refused() {
         metaplan_in(copy.path(), &["plan", "mission.toml"], "")
     };
     let duration = "(= ?duration (travel_time ?from ?to))";
-    let refused = outcome(duration, "(= ?duration (+ (travel_time ?from ?to) (change)))");
-    assert_eq!(refused.status, 3, "{refused:#?}");
-    assert!(refused.stderr.contains("M228") && refused.stderr.contains("`(change)`"), "{refused:#?}");
     let arrival = "(at end (robot_at ?to))";
-    let counted = outcome(arrival, &format!("{arrival} (at end (increase (battery_used) (change)))"));
-    assert_eq!((counted.status, counted.stderr.as_str()), (0, ""), "{counted:#?}");
+    let added = |amount: &str| format!("{arrival} (at end (increase (battery_used) {amount}))");
+    // The amount for a sum over two designs is the sum of the amounts only if it is linear.
+    for (place, replacement) in [
+        (duration, "(= ?duration (+ (travel_time ?from ?to) (change)))".to_owned()),
+        (arrival, added("(* (change) (change))")),
+        (arrival, added("(* 2 (+ 1 (* (change) (- (change) 1))))")),
+        (arrival, added("(/ 20 (+ (change) 10))")),
+    ] {
+        let refused = outcome(place, &replacement);
+        assert_eq!(refused.status, 3, "{refused:#?}");
+        assert!(refused.stderr.contains("M228") && refused.stderr.contains("`(change)`"), "{refused:#?}");
+    }
+    for amount in ["(change)", "(- (* 2 (change)) (/ (change) 2))"] {
+        let counted = outcome(arrival, &added(amount));
+        assert_eq!((counted.status, counted.stderr.as_str()), (0, ""), "{counted:#?}");
+    }
 }
 
 #[test]

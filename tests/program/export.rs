@@ -86,6 +86,58 @@ fn exported_files_are_normalised() {
     );
 }
 
+/// Creates the warehouse mission with a replacement in its knowledge base.
+fn warehouse(old: &str, new: &str) -> tempfile::TempDir {
+    let directory = tempfile::tempdir().expect("a directory");
+    let here = directory.path();
+    assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
+    let robot = here.join("m/robot.ttl");
+    let text = std::fs::read_to_string(&robot).expect("text");
+    assert!(text.contains(old), "{old}");
+    std::fs::write(robot, text.replace(old, new)).expect("written");
+    directory
+}
+
+/// The predicate of a quality bound is named after the bound, whose name may have characters that PDDL does not
+/// allow, as that of an anonymous bound has.
+#[test]
+fn bounds_with_names_outside_of_pddl_are_exported() {
+    let anonymous =
+        "[ a t:Requirement ; t:isQAtype :needed_light ; t:hasMaximum 0.0 ; t:inContext \"dark_aisle\" ]";
+    for (old, new) in [
+        (":sees_in_the_dark", "<http://example.org/r#light(0)>"),
+        ("t:requiresQuality :sees_in_the_dark", &format!("t:requiresQuality {anonymous}")),
+    ] {
+        let directory = warehouse(old, new);
+        let run = |arguments: &[&str]| {
+            let outcome = metaplan_in(directory.path(), arguments, "");
+            assert_eq!(outcome.status, 0, "{new}: {outcome:#?}");
+            outcome
+        };
+        let planned = run(&["plan", "m/mission.toml", "--certificate", "proof", "--format", "json"]);
+        run(&["verify", "proof"]);
+        run(&["export", "m/mission.toml", "--to", "pddl", "-o", "out"]);
+        let exported = std::fs::read_to_string(directory.path().join("out/domain.pddl")).expect("a domain");
+        assert!(exported.contains("(fd_meets_."), "{exported}");
+        let again = run(&["plan", "out/domain.pddl", "out/problem.pddl", "--format", "json"]);
+        assert_eq!(planned.json()["cost"], again.json()["cost"], "{new}");
+    }
+}
+
+/// PDDL files may not have numbers of more than 400 digits, so the knowledge base may not have them either.
+#[test]
+fn values_with_too_many_digits_are_refused() {
+    let old = ":grasp_time ; t:hasValue 4.0";
+    for (digits, status) in [(400, 0), (401, 3)] {
+        let directory = warehouse(old, &format!(":grasp_time ; t:hasValue {}", "4".repeat(digits)));
+        let outcome =
+            metaplan_in(directory.path(), &["export", "m/mission.toml", "--to", "pddl", "-o", "out"], "");
+        assert_eq!(outcome.status, status, "{outcome:#?}");
+        let words = ["P105", "`(fd_grasp_time fd_suction)` has more than 400 digits"];
+        assert!(status == 0 || words.iter().all(|word| outcome.stderr.contains(word)), "{outcome:#?}");
+    }
+}
+
 #[test]
 fn files_of_models_have_the_requested_format() {
     let directory = tempfile::tempdir().expect("a temporary directory");

@@ -91,6 +91,23 @@ fn unused_names_are_warnings() {
     );
 }
 
+/// A message about a name or object of the knowledge base explains where it comes from, and does not point to a
+/// declaration that is in no file.
+#[test]
+fn contributions_of_the_knowledge_base_are_explained() {
+    check(
+        &[("problem.pddl", ":metric minimize (total-time)", ":metric minimize (grasp_time)")],
+        3,
+        &["P122", "`grasp_time` is a sum over the designs", "problem.pddl:32:22", "in effects"],
+    );
+    let outcome = check(
+        &[("problem.pddl", "box vase - item", "box vase f_grasp - item")],
+        3,
+        &["P127", "the object `f_grasp` is a constant of another type", "problem.pddl:10:"],
+    );
+    assert!(!outcome.stdout.contains("domain.pddl:1:1"), "{outcome:#?}");
+}
+
 #[test]
 fn bindings_fit_their_symbols() {
     let bound = |binding: &str, words: &[&str]| {
@@ -145,6 +162,15 @@ fn functions_of_positions_exist() {
     // `battery` has no parameter.
     let outcome = positions("[\"up\", \"battery\"]");
     assert!(outcome.stdout.contains("`up`") && outcome.stdout.contains("2 errors,"), "{}", outcome.stdout);
+}
+
+/// By default, only a function of designs gets the values of the attribute that has its name.
+#[test]
+fn functions_of_places_may_have_names_of_attributes() {
+    for functions in ["(needed_light ?place - place)", "(fd_needed_light ?place - (either place item))"] {
+        let functions = format!("(:functions {functions}");
+        check(&[("domain.pddl", "(:functions", &functions)], 0, &["no problems found"]);
+    }
 }
 
 #[test]

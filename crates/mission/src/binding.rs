@@ -12,6 +12,7 @@ use num_rational::BigRational;
 
 use ontology::tomasys::{Action, FunctionDesign, Individual, View};
 use ontology::vocab::local_name;
+use pddl::TypeHierarchy;
 use pddl::ast::{
     Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
     TypedName,
@@ -138,6 +139,19 @@ impl Bindings {
         &self.written
     }
 
+    /// Returns errors for the entries that a domain in PLANTA's form cannot use, because it is filled by the names of the
+    /// ontology: all entries of `[bindings.names]`, and all bindings except to `solves` and `available`.
+    pub(super) fn unused_in_planta(&self) -> Vec<Message> {
+        let reason = "the domain is in PLANTA's form, which uses the names of the knowledge base";
+        let text = format!("{reason}; remove the entry, or rename the individual or the object");
+        let names = self.names.entries().iter().map(|entry| entry.wrong("M236", &text));
+        let is_used = |query: &Query| matches!(query, Query::Solves | Query::Available);
+        let bound = self.own.iter().filter(|(_, query)| !is_used(query)).map(|(symbol, _)| {
+            Message::error("M236", format!("`{symbol}` is bound, but {reason}; remove the binding"))
+        });
+        names.chain(bound).collect()
+    }
+
     /// Returns the predicates that state which design solves which function: explicitly bound ones and the
     /// default names, declared or not.
     pub fn solves(&self) -> Vec<Name> {
@@ -203,7 +217,7 @@ impl Bindings {
         self.predicate(predicate) == Some(Query::Available)
     }
 
-    /// Returns `true` if a predicate is bound to a query, so that the knowledge base adds its facts.
+    /// Returns `true` if a predicate is bound to a query, explicitly or by default.
     pub(super) fn is_bound_predicate(&self, predicate: &Name) -> bool {
         self.predicate(predicate).is_some()
     }
@@ -389,7 +403,7 @@ pub(super) fn fill(
         }
     }
     for declared in &domain.functions {
-        fill.values(declared, &bindings.function(declared));
+        fill.values(domain, declared, bindings);
     }
     fill.warnings
 }
@@ -582,14 +596,30 @@ impl Fill<'_> {
         }
     }
 
-    fn values(&mut self, declared: &Declaration, query: &Query) {
-        let name = &declared.identifier.name;
+    /// Returns the names of the objects that are arguments of a parameter with this type.
+    fn fitting(&self, domain: &Domain, r#type: &TypeExpression) -> HashSet<Name> {
+        let hierarchy = TypeHierarchy::of(domain);
+        let objects = domain.constants.iter().chain(&self.problem.objects);
+        let fitting = objects.filter(|object| hierarchy.fits(&object.r#type, r#type));
+        fitting.map(|object| object.identifier.name.clone()).collect()
+    }
+
+    fn values(&mut self, domain: &Domain, declared: &Declaration, bindings: &Bindings) {
+        let (name, query) = (&declared.identifier.name, bindings.function(declared));
         let mut values: Vec<(Vec<String>, BigRational)> = Vec::new();
-        match query {
+        match &query {
             Query::Estimation(attribute) if declared.parameters.len() == 1 => {
                 for design in self.known.designs() {
                     let value = estimation(design, attribute);
                     values.extend(value.map(|value| (vec![design.individual.name.clone()], value.clone())));
+                }
+                // By default, a function is bound to the attribute of its name. Without the type of designs it is
+                // another function, for example of places.
+                if !values.is_empty() && !bindings.own.contains_key(name) {
+                    let fitting = self.fitting(domain, &declared.parameters[0].r#type);
+                    values.retain(|(arguments, _)| {
+                        arguments.iter().all(|argument| fitting.contains(&Name::new(argument)))
+                    });
                 }
             }
             Query::Measured(attribute) if declared.parameters.is_empty() => {

@@ -143,8 +143,8 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M215",
         "A predicate of a template has no conclusions.",
-        "The domain uses an `inferred-…` predicate for which the knowledge base has no property or class.",
-        "Correct the name, or use a knowledge base that defines it.",
+        "The domain uses an `inferred-…` predicate for which the knowledge base has no property or class, or it declares all of these predicates itself, so that the axioms of the knowledge base are not added.",
+        "Correct the name, use a knowledge base that defines it, or remove the declarations.",
     ],
     [
         "M221",
@@ -191,7 +191,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M228",
         "A reconfiguration cannot be counted at this position.",
-        "A function bound to `reconfigured:ATTRIBUTE` occurs in a duration, a condition, or an effect other than `increase` and `decrease`.",
+        "A function bound to `reconfigured:ATTRIBUTE` occurs in a duration, a condition, or an effect other than `increase` and `decrease`, or its amount is not linear (a product of two such functions, or a divisor).",
         "Add it to a number in an effect, as in `(increase (total-cost) (reconfiguration))`, and use this number in the metric.",
     ],
     [
@@ -217,6 +217,12 @@ pub const CODES: &[[&str; 4]] = &[
         "A binding does not fit its symbol.",
         "`[bindings]` binds a symbol to a query of another kind, for example a predicate with one parameter to `solves`.",
         "Use a query that fits the symbol, or remove the binding, so that the default applies.",
+    ],
+    [
+        "M236",
+        "A domain in PLANTA's form does not use a binding.",
+        "`[bindings]`, `[bindings.names]` or `--name` has an entry, but such a domain uses the names of the knowledge base.",
+        "Remove the entry. Rename the individual or the object if their names differ.",
     ],
     [
         "M310",

@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use diagnostics::nearest;
 use ontology::tomasys::FunctionDesign;
 use ontology::vocab::local_name;
-use pddl::ast::{ActionBody, Assignment, Effect, InitialElement, Name};
-use pddl::{Diagnostic, Severity, print_domain};
+use pddl::ast::{ActionBody, Assignment, Effect, Identifier, InitialElement, Name};
+use pddl::{Diagnostic, Mentioned, Severity, print_domain};
 use rules::{Engine, Fact};
 
 use crate::joined::Mission;
@@ -16,8 +16,8 @@ use crate::message::{Message, did_you_mean};
 
 impl Mission {
     /// Returns lint warnings: actions and designs of the knowledge base that the PDDL files do not name,
-    /// components and attributes that nothing uses or declares, bindings to unknown names, and numeric
-    /// functions without a value. Without a knowledge base, only numeric functions are checked.
+    /// components and attributes that nothing uses or declares, bindings to unknown names, conclusions that the
+    /// domain declares itself, and numeric functions without a value. Without a knowledge base, only numeric functions are checked.
     pub fn doubts(&self) -> Vec<Message> {
         let Some(knowledge) = &self.knowledge else { return self.functions_without_value() };
         let mut doubts = Vec::new();
@@ -25,6 +25,7 @@ impl Mission {
         // matching names.
         if self.planta.is_none() {
             doubts.extend(self.actions_without_schema(knowledge));
+            doubts.extend(self.declared_conclusions());
         }
         let never_named = self.never_named.iter();
         doubts.extend(never_named.map(|(iri, text)| doubt_about(knowledge, "M221", iri, text.clone())));
@@ -107,6 +108,49 @@ impl Mission {
         doubts
     }
 
+    /// Warns about used predicates `inferred-…` that nothing makes true, although there is a knowledge base: no axiom,
+    /// binding, effect or fact. A domain that declares all of them is not in PLANTA's form, so that the knowledge base
+    /// adds no axioms.
+    fn declared_conclusions(&self) -> Vec<Message> {
+        let is_conclusion = |name: &Name| name.as_str().to_ascii_lowercase().starts_with("inferred-");
+        let declared = self.domain.predicates.iter().map(|declared| &declared.identifier);
+        let conclusions: Vec<_> = declared.filter(|declared| is_conclusion(&declared.name)).collect();
+        if conclusions.is_empty() {
+            return Vec::new();
+        }
+        let problem = self.current();
+        let mentioned = Mentioned::by_domain(&self.domain).and_problem(&problem);
+        let facts: BTreeSet<&Name> = problem
+            .init
+            .iter()
+            .filter_map(|element| match element {
+                InitialElement::Fact(atom) => Some(&atom.predicate.name),
+                _ => None,
+            })
+            .collect();
+        let axioms = || self.domain.derived.iter().map(|axiom| &axiom.head.identifier.name);
+        let is_empty = |name: &Name| {
+            mentioned.predicates.contains(name)
+                && !mentioned.changed.contains(name)
+                && !facts.contains(name)
+                && !self.bindings.is_bound_predicate(name)
+                && !axioms().any(|head| head == name)
+        };
+        let warning = |identifier: &Identifier| {
+            let text = format!(
+                "the domain declares `{}`, so the knowledge base adds no conclusions for it, and nothing else makes it true",
+                identifier.name
+            );
+            let diagnostic =
+                Diagnostic::new(&self.domain_source, identifier.span, Severity::Warning, "M215", text);
+            Message::from_pddl(&[diagnostic], &[&self.domain_source])
+        };
+        let help = "remove the declaration; a domain with undeclared predicates `inferred-…` gets the axioms of the \
+                    knowledge base";
+        let empty = conclusions.into_iter().filter(|identifier| is_empty(&identifier.name));
+        empty.flat_map(warning).map(|message| message.with_help(help)).collect()
+    }
+
     /// Warns about numeric functions that the domain uses, but that have neither an initial value nor an `assign`
     /// effect. `total-cost` and sums over designs are exempt.
     fn functions_without_value(&self) -> Vec<Message> {
@@ -143,7 +187,7 @@ impl Mission {
                 && !self.stands_for_designs(name)
                 && !effects.iter().any(|effect| assigns(effect, name))
         });
-        let warning = |identifier: &pddl::ast::Identifier| {
+        let warning = |identifier: &Identifier| {
             let sources = match self.knowledge {
                 Some(_) => "neither the problem nor the knowledge base gives one, by name or by a binding",
                 None => "the problem does not give one, and there is no knowledge base",

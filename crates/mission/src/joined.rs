@@ -3,8 +3,8 @@
 use std::collections::{BTreeSet, HashSet};
 use std::sync::{Arc, OnceLock};
 
-use pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
-use pddl::{self, Severity, Source};
+use pddl::ast::{Atom, Condition, Direction, Domain, InitialElement, Metric, Name, Problem, Span, Term};
+use pddl::{self, Diagnostic, Severity, Source};
 use tracing::info_span;
 
 use crate::binding::Bindings;
@@ -94,11 +94,16 @@ impl Mission {
             }
         };
         let (mut domain, mut problem, mut warnings) = (domain, problem, warnings);
-        let planta = knowledge.as_ref().and_then(|knowledge| {
-            let (planta, completed, more) = Planta::new(knowledge.terms()?, &domain, &mut problem);
+        let terms = knowledge.as_ref().and_then(Knowledge::terms);
+        let unused = terms.map_or_else(Vec::new, |_| bindings.unused_in_planta());
+        if !unused.is_empty() {
+            return Err(unused.into());
+        }
+        let planta = terms.map(|terms| {
+            let (planta, completed, more) = Planta::new(terms, &domain, &mut problem);
             domain = completed;
             warnings.extend(more);
-            Some(planta)
+            planta
         });
         if knowledge.is_some() && planta.is_none() {
             Errors::unless_empty(bindings.misfits(&domain))?;
@@ -217,6 +222,7 @@ impl Mission {
         let _span = info_span!("fill").entered();
         let mut problem = self.problem.clone();
         let mut warnings = self.fill(&mut problem);
+        warnings.extend(unreadable_values(&problem));
         if warnings.iter().any(Message::is_error) {
             return Err(warnings.into());
         }
@@ -225,23 +231,35 @@ impl Mission {
             diagnostics.into_iter().partition(|diagnostic| diagnostic.severity == Severity::Error);
         let sources = [&self.domain_source, &self.problem_source];
         if errors.is_empty() {
-            warnings.extend(Message::from_pddl(&questionable, &sources));
+            let (contributed, located) = by_origin(questionable);
+            warnings.extend(Message::from_pddl(&located, &sources));
+            warnings.extend(contributed.iter().map(|(code, text)| Message::warning(code, text)));
             return Ok((problem, warnings));
         }
-        // Contributions of settings and of the knowledge base have no source location. Messages
-        // about them must not point into a file.
-        let (contributed, located): (Vec<_>, Vec<_>) =
-            errors.into_iter().partition(|diagnostic| diagnostic.span == pddl::ast::Span::default());
-        let mut messages = Message::from_pddl(&located, &sources);
+        let (contributed, located) = by_origin(errors);
+        let mut messages = Message::from_pddl(&self.about_sums(located), &sources);
         if self.planta.is_some() && messages.iter().any(|message| message.code == "P134") {
             messages.retain(|message| message.code != "P134");
             messages.extend(Planta::unknown(&self.domain));
         }
-        messages.extend(contributed.iter().map(|diagnostic| {
-            let text = format!("{} (from a setting or from the knowledge base)", diagnostic.message);
-            Message::error(diagnostic.code, text)
-        }));
+        messages.extend(contributed.iter().map(|(code, text)| Message::error(code, text)));
         Err(messages.into())
+    }
+
+    /// Rewrites errors about unknown functions that a sum over designs replaces: the domain declares them, but they have
+    /// a value only in actions.
+    fn about_sums(&self, mut diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
+        for diagnostic in diagnostics.iter_mut().filter(|diagnostic| diagnostic.code == "P122") {
+            let name = diagnostic.message.split('`').nth(1).map(ToOwned::to_owned);
+            let Some(name) = name.filter(|name| self.stands_for_designs(&Name::new(name))) else { continue };
+            diagnostic.message = format!(
+                "`{name}` is a sum over the designs that are chosen for an action, so it has a value only in actions"
+            );
+            diagnostic.help = Some(format!(
+                "add it to a number in effects, as in `(increase (total-cost) ({name}))`, and use this number here"
+            ));
+        }
+        diagnostics
     }
 
     /// Returns the predicates of the knowledge base and of numeric comparisons that complete a domain
@@ -303,7 +321,10 @@ impl Mission {
         let source = Source::new("objective", text);
         match pddl::read_objective(Direction::Minimize, &source, &self.domain, problem) {
             Ok(metric) => Ok(ParsedObjective { metric, source }),
-            Err(diagnostics) => Err(Message::from_pddl(&diagnostics, &[&source]).into()),
+            Err(diagnostics) => {
+                let diagnostics = self.about_sums(diagnostics.into_iter().collect());
+                Err(Message::from_pddl(&diagnostics, &[&source]).into())
+            }
         }
     }
 }
@@ -328,6 +349,37 @@ fn joined_names(
     }
     warnings.extend(more);
     Ok((problem_designs, never_named))
+}
+
+/// Separates the diagnostics about contributions of settings and of the knowledge base, which have no source location,
+/// so that messages about them do not point into a file. Returns their codes and texts, and all other diagnostics.
+fn by_origin(diagnostics: Vec<Diagnostic>) -> (Vec<(&'static str, String)>, Vec<Diagnostic>) {
+    let (contributed, located): (Vec<_>, Vec<_>) =
+        diagnostics.into_iter().partition(|diagnostic| diagnostic.span == Span::default());
+    let text = |diagnostic: Diagnostic| {
+        (diagnostic.code, format!("{} (from a setting or from the knowledge base)", diagnostic.message))
+    };
+    (contributed.into_iter().map(text).collect(), located)
+}
+
+/// Returns errors for the values of settings and of the knowledge base that PDDL files, for example those of a
+/// certificate, cannot contain, because they have too many digits.
+fn unreadable_values(problem: &Problem) -> Vec<Message> {
+    let unreadable = problem.init.iter().filter_map(|element| match element {
+        InitialElement::Value(atom, value, span) if *span == Span::default() => {
+            (!pddl::is_readable(value)).then_some(atom)
+        }
+        _ => None,
+    });
+    let error = |atom: &Atom| {
+        let arguments: String = atom.arguments.iter().map(|term| format!(" {}", term.name())).collect();
+        let text = format!(
+            "the value of `({}{arguments})` has more than 400 digits (from a setting or from the knowledge base)",
+            atom.predicate.name
+        );
+        Message::error("P105", text).with_help("write fewer digits")
+    };
+    unreadable.map(error).collect()
 }
 
 fn parse(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Message>), Errors> {

@@ -128,7 +128,11 @@ impl Diagnostic {
         self
     }
 
+    /// Adds a related position, unless the span is empty because no file has it.
     pub(crate) fn related(&mut self, source: &Source, span: Span, message: impl Into<String>) -> &mut Self {
+        if span == Span::default() {
+            return self;
+        }
         let place = source.position(span.start);
         let file = source.name().to_owned();
         self.related =

@@ -37,7 +37,7 @@ pub use codes::CODES;
 pub use diagnostic::{Diagnostic, Errors, Severity, has_errors, render};
 pub use excerpt::{Excerpt, Shown};
 pub use mentioned::Mentioned;
-pub use number::to_decimal;
+pub use number::{is_readable, to_decimal};
 pub use parse::{parse_domain, parse_problem, parse_problem_of};
 pub use portable::portable;
 pub use print::{print_domain, print_expression, print_problem};

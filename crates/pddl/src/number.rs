@@ -107,6 +107,15 @@ pub fn to_decimal(value: &BigRational) -> Option<String> {
     Some(format!("{sign}{whole}{point}{fraction}"))
 }
 
+/// Returns `true` if the parser accepts `value` as it is printed. It refuses numbers of more than 400 digits.
+pub fn is_readable(value: &BigRational) -> bool {
+    let digits = |text: &str| text.bytes().filter(u8::is_ascii_digit).count();
+    match to_decimal(value) {
+        Some(decimal) => digits(&decimal) <= MAX_DIGITS,
+        None => [value.numer(), value.denom()].iter().all(|part| digits(&part.to_string()) <= MAX_DIGITS),
+    }
+}
+
 /// Converts an index to 32 bits. Panics from 2^32 on, which no index of bytes, names or parameters in memory
 /// reaches.
 pub(crate) fn dense(index: usize) -> u32 {
@@ -148,6 +157,25 @@ mod tests {
     fn short_texts_cannot_denote_huge_numbers() {
         for text in ["1e999999999", "1e-400", "11e399", "1e99999999999999999999", &"9".repeat(401)] {
             assert_eq!(literal(text), Literal::TooLong, "{text}");
+        }
+    }
+
+    #[test]
+    fn printed_numbers_are_readable_up_to_the_limit() {
+        let power = |exponent: u32| BigInt::from(10).pow(exponent);
+        let fraction = |numerator: BigInt, denominator: BigInt| BigRational::new(numerator, denominator);
+        for (value, expected) in [
+            (fraction(power(399), 1.into()), true),
+            (fraction(power(400), 1.into()), false),
+            (fraction(1.into(), power(399)), true),
+            (fraction(1.into(), power(400)), false),
+            (fraction((-1).into(), power(399) + 1), true),
+            (fraction(1.into(), power(400) + 1), false),
+        ] {
+            assert_eq!(is_readable(&value), expected, "{value}");
+            if let Some(decimal) = to_decimal(&value) {
+                assert_eq!(literal(&decimal) != Literal::TooLong, expected, "{value}");
+            }
         }
     }
 

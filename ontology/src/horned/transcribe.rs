@@ -25,10 +25,12 @@ fn message(error: &HornedError) -> String {
             "an element ends here that lacks a part, or has one that OWL does not know".to_owned()
         }
         HornedError::ValidityError(message, _) => message.clone(),
-        // The message of the functional-style parser quotes the line; its last line has the reason.
+        // The message of the functional-style parser quotes the line; its last line has the reason, after a margin of
+        // the width of the line number.
         HornedError::ParserError(error, _) => {
             let text = error.to_string();
-            text.rsplit_once("\n  = ").map_or(text.clone(), |(_, reason)| reason.to_owned())
+            let reason = text.lines().next_back().and_then(|line| line.trim_start().strip_prefix("= "));
+            reason.map_or_else(|| text.clone(), str::to_owned)
         }
         _ => error.to_string(),
     }

@@ -43,6 +43,28 @@ pub(super) fn document(ontology: &Ontology) -> String {
     text + ")\n"
 }
 
+/// Checks that the reader of the syntax accepts the rules: arguments of data properties, data ranges and built-ins must
+/// not be individuals, although SWRL allows the first argument of a data property to be one. Otherwise describes the
+/// first such atom.
+pub(super) fn require_rules(ontology: &Ontology) -> Result<(), String> {
+    let is_individual = |argument: &Argument| matches!(argument, Argument::Individual(_));
+    let is_unreadable = |atom: &&Atom| match atom {
+        Atom::DataProperty(_, x, y) => is_individual(x) || is_individual(y),
+        Atom::DataRange(_, x) => is_individual(x),
+        Atom::BuiltIn(_, arguments) => arguments.iter().any(is_individual),
+        _ => false,
+    };
+    let mut atoms = ontology.rules.iter().flat_map(|rule| rule.body.iter().chain(&rule.head));
+    match atoms.find(is_unreadable) {
+        None => Ok(()),
+        Some(unreadable) => Err(format!(
+            "a rule has `{}`, and readers of this syntax accept no individual there; choose another syntax, such as \
+             Turtle",
+            atom(unreadable)
+        )),
+    }
+}
+
 /// Returns `false` for n-ary axioms with fewer than two members: these axioms state nothing, and the
 /// syntax has no form for them.
 fn has_form(axiom: &Axiom) -> bool {

@@ -59,6 +59,11 @@ pub fn convert_files<P: AsRef<Path>>(
         OutputSyntax::NTriples => RdfFormat::NTriples,
         OutputSyntax::OwlXml | OutputSyntax::Functional => {
             let ontology = read::read_files(files, options)?;
+            functional::require_rules(&ontology).map_err(|reason| {
+                let syntax =
+                    if syntax == OutputSyntax::OwlXml { "OWL/XML" } else { "functional-style syntax" };
+                vec![Error::Unwritable { syntax, reason }]
+            })?;
             let text = functional::document(&ontology);
             let text = match syntax {
                 OutputSyntax::Functional => text,

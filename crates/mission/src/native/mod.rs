@@ -22,6 +22,7 @@ mod walk;
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 
 use num_rational::BigRational;
 use num_traits::Zero as _;
@@ -173,7 +174,8 @@ impl CoAdaptation {
             for function in action.into_iter().flat_map(|action| self.not_counted(action)) {
                 let text = format!(
                     "`{name}` uses `({function})` where reconfigurations cannot be counted; use it in `increase` or \
-                     `decrease`, outside of `when` and `forall`"
+                     `decrease`, outside of `when` and `forall`, and neither in a product with such a function nor in \
+                     a divisor"
                 );
                 errors.push(Message::error("M228", text));
             }
@@ -200,9 +202,10 @@ impl CoAdaptation {
 
     fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
         let uncounted = RefCell::new(BTreeSet::new());
+        let is_counted = |name: &Name| self.changed.contains_key(name);
         let see = |part: &mut Expression| {
             if let Expression::Fluent(fluent) = part
-                && self.changed.contains_key(&fluent.predicate.name)
+                && is_counted(&fluent.predicate.name)
             {
                 uncounted.borrow_mut().insert(fluent.predicate.name.clone());
             }
@@ -210,7 +213,7 @@ impl CoAdaptation {
         match action.body.clone() {
             ActionBody::Instantaneous { mut precondition, effect } => {
                 precondition.change_leaves(&mut |leaf| see(leaf));
-                walk_uncounted(effect, &see);
+                walk_uncounted(effect, &is_counted, &see);
             }
             ActionBody::Durative { duration, conditions, effects } => {
                 for mut constraint in duration {
@@ -220,7 +223,7 @@ impl CoAdaptation {
                     condition.change_leaves(&mut |leaf| see(leaf));
                 }
                 for (_, effect) in effects {
-                    walk_uncounted(effect, &see);
+                    walk_uncounted(effect, &is_counted, &see);
                 }
             }
         }
@@ -598,8 +601,23 @@ fn has_parameter(action: &Action, name: &Name) -> bool {
     action.parameters.iter().any(|parameter| parameter.identifier.name == *name)
 }
 
+/// Returns the name of the predicate of the designs that meet a quality bound. Characters that PDDL does not allow, for
+/// example in the IRI of an anonymous bound, are replaced by their hexadecimal codes between dots.
 fn meets(quality: &Quality) -> Name {
-    Name::new(&format!("fd_meets_{}", quality.individual.name))
+    let name = &quality.individual.name;
+    // Only a replaced name begins with a dot, and its dots are replaced, so that different names remain different.
+    if is_pddl_name(name) && !name.starts_with('.') {
+        return Name::new(&format!("fd_meets_{name}"));
+    }
+    let mut replaced = String::from("fd_meets_.");
+    for c in name.chars() {
+        if c.is_ascii_alphanumeric() || "-_".contains(c) {
+            replaced.push(c);
+        } else {
+            let _ = write!(replaced, ".{:x}.", u32::from(c));
+        }
+    }
+    Name::new(&replaced)
 }
 
 /// Returns the name of the numeric function that has the value of an attribute for a design.

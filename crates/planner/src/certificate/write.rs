@@ -32,6 +32,36 @@ pub struct Certificate {
     pub argument: String,
 }
 
+impl Certificate {
+    /// Returns the certificate without variables, numbers and operators if grounding has already found the goal
+    /// unreachable, and `None` otherwise. Its argument needs only the goal, which is false.
+    ///
+    /// Grounding prunes such a task only partly: it may have variables and numbers that an action changes although it
+    /// has no operator for the action.
+    pub fn of_false_goal(&self) -> Option<Self> {
+        let model: Model = serde_json::from_str(&self.task).ok()?;
+        if !model.goal.clauses.iter().any(Vec::is_empty) {
+            return None;
+        }
+        let reduced = Model {
+            goal: Condition { clauses: vec![Vec::new()], ..Condition::default() },
+            variables: Vec::new(),
+            basic: 0,
+            values: Vec::new(),
+            numbers: Vec::new(),
+            fluents: Vec::new(),
+            slots: Vec::new(),
+            uses: Vec::new(),
+            exclusions: Vec::new(),
+            tables: Vec::new(),
+            operators: Vec::new(),
+            axioms: Vec::new(),
+            ..model
+        };
+        Some(written(&reduced, &Argument { format: ARGUMENT_FORMAT.into(), ..Argument::default() }))
+    }
+}
+
 /// Creates the certificate of a solution.
 ///
 /// # Errors
