@@ -158,7 +158,7 @@ impl Referee<'_> {
     }
 
     /// Evaluates a plan, action by action. Each action needs the configuration that the changes before it lead to.
-    /// So after a failed change the next action cannot be executed, which ends the mission.
+    /// After a failed change the next action cannot be executed, which ends the mission.
     pub fn play_plan(&self, plan: &[Action]) -> Result<Measures, Error> {
         let mut configuration = self.mission.initial;
         let steps = plan.iter().map(|action| {
