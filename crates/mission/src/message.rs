@@ -252,6 +252,7 @@ pub struct ErrorAnswer<'a> {
     /// Name and version of this format.
     #[cfg_attr(feature = "schema", schemars(extend("const" = ERROR_FORMAT)))]
     format: &'static str,
+    /// All errors and warnings.
     messages: &'a [Message],
 }
 
