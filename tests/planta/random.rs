@@ -379,7 +379,7 @@ fn designs_are_not_mentioned_if_there_are_none() {
     let domain = "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x))
  (:action b :parameters (?x) :precondition (inferred-Ca ?x) :effect (done ?x)))\n"
         .to_owned();
-    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i2)))\n".to_owned();
+    let problem = "(define (problem p) (:domain d) (:objects i2) (:init) (:goal (done i2)))\n".to_owned();
     let directory = tempfile::tempdir().expect("a directory");
     let knowledge = knowledge("ClassAssertion(:Ca :i1)\n");
     let input = Texts { knowledge, domain, problem }.write(directory.path());
