@@ -50,9 +50,13 @@ impl Arguments {
 fn is_pddl(first: &Path, second: &Path) -> bool {
     // Standard input can be read only once.
     if first == Path::new("-") {
-        return second.exists();
+        return is_pddl_file(second);
     }
-    source(first).is_ok_and(|file| matches!(Kind::of(file.text()), Some(Kind::Domain | Kind::Problem)))
+    is_pddl_file(first)
+}
+
+fn is_pddl_file(path: &Path) -> bool {
+    source(path).is_ok_and(|file| matches!(Kind::of(file.text()), Some(Kind::Domain | Kind::Problem)))
 }
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {

@@ -230,8 +230,9 @@ fn violated(wishes: &Wishes, kept: &[&Offer]) -> Vec<String> {
     let mut violated = Vec::new();
     for component in &wishes.exclusive {
         let users = kept.iter().filter(|offer| offer.components.contains(component));
-        let users: Vec<&str> = users.map(|offer| offer.design.as_str()).collect();
+        let users: BTreeSet<&str> = users.map(|offer| offer.design.as_str()).collect();
         if users.len() > 1 {
+            let users: Vec<&str> = users.into_iter().collect();
             violated.push(format!("{} use {component}, which only one design can use", users.join(" and ")));
         }
     }

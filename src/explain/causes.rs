@@ -130,12 +130,14 @@ fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Ways {
     Ways { sets: nearest(&sets), unexamined }
 }
 
-/// Returns the sets that imply no other set. For example, `above 8` is omitted if `above 7` suffices.
+/// Returns the sets that imply no other set. For example, `above 8` is omitted if `above 7` suffices. Sets that
+/// imply each other, such as those for two measurements of an attribute, are all kept.
 fn nearest(sets: &[Vec<Alteration>]) -> Vec<Vec<Alteration>> {
     let implies = |set: &[Alteration], other: &[Alteration]| {
         other.iter().all(|needed| set.iter().any(|alteration| alteration.implies(needed)))
     };
-    let is_nearest = |set: &&Vec<Alteration>| sets.iter().all(|other| other == *set || !implies(set, other));
+    let is_nearest =
+        |set: &&Vec<Alteration>| sets.iter().all(|other| !implies(set, other) || implies(other, set));
     sets.iter().filter(is_nearest).cloned().collect()
 }
 

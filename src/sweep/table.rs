@@ -82,7 +82,12 @@ impl Table {
                 for (key, value) in &line.vary {
                     let Some(cell) = cells.remove(key) else { continue };
                     let namesake = format!("{ANSWER}{key}");
-                    if shown(&cell) != shown(&joined(value.clone())) {
+                    // Numbers such as 500 and 500.0 are equal.
+                    let numbers = cell.as_f64().zip(value.as_f64());
+                    let is_equal = cell.is_null()
+                        || shown(&cell) == shown(&joined(value.clone()))
+                        || numbers.is_some_and(|(cell, value)| cell.total_cmp(&value).is_eq());
+                    if !is_equal {
                         namesakes.insert(namesake.clone());
                     }
                     cells.insert(namesake, cell);
@@ -132,9 +137,13 @@ impl Table {
         let counts: Vec<bool> =
             (0..self.columns.len()).map(|column| column >= self.keys && is_number(column)).collect();
         let is_status = |column: usize| self.columns[column] == STATUS;
-        let is_common = |column: usize| {
-            !counts[column] && !is_status(column) && !repetitions.contains(&self.columns[column])
+        // A field of the answers with the name of a repeated key differs between repetitions, too.
+        let is_repeated = |column: usize| {
+            let name = self.columns[column].as_str();
+            let key = name.strip_prefix(ANSWER).unwrap_or(name);
+            repetitions.iter().any(|repeated| repeated == key)
         };
+        let is_common = |column: usize| !counts[column] && !is_status(column) && !is_repeated(column);
         let mut groups: Vec<(Common, Vec<&Row>)> = Vec::new();
         let mut positions: BTreeMap<String, usize> = BTreeMap::new();
         for row in &self.rows {
@@ -232,6 +241,11 @@ mod tests {
         let table = Table::new(&answers, "", false);
         assert_eq!(table.columns, ["fail", "seed", "answer.seed", "exit_status", "timed_out"]);
         assert_eq!(table.rows[1].cells[1..3], [Some(json!(1)), Some(json!(5))]);
+        let equal = [line(0, 1, "a", json!({"seed": 1.0, "fail": "a"}))];
+        assert_eq!(Table::new(&equal, "", false).columns, ["fail", "seed", "exit_status", "timed_out"]);
+        // It separates no groups if the key is repeated.
+        let answers = ["x", "y"].map(|seed| line(0, 1, "a", json!({"seed": seed})));
+        assert_eq!(Table::new(&answers, "", false).groups(&["seed".to_owned()]).len(), 1);
         let parts = Table::new(&[line(0, 1, "a", json!({"l": [{"v": 1}, {"v": 2}]}))], "/l", false);
         assert_eq!(parts.rows.len(), 2);
     }

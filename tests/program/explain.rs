@@ -149,6 +149,11 @@ const DRY_WITHOUT_SECOND: &str = "[dry without second] t:c_status(r:c_second, \"
 
 /// Explains, with own rules in addition to the shipped ones. `arguments` follow the mission.
 fn explain_with(rules: &[&str], arguments: &str, format: &str) -> String {
+    explain_statements("", rules, arguments, format)
+}
+
+/// Like [`explain_with`], with more statements in the knowledge base.
+fn explain_statements(statements: &str, rules: &[&str], arguments: &str, format: &str) -> String {
     let folder = tempfile::tempdir().expect("a directory");
     copy_folder(&root().join("missions/templates/blank"), folder.path());
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
@@ -159,7 +164,7 @@ fn explain_with(rules: &[&str], arguments: &str, format: &str) -> String {
              t:isMeasured true ; t:hasValue {value} .\n"
         )
     });
-    write("robot.ttl", &(read("robot.ttl") + "\n" + &measured.concat()));
+    write("robot.ttl", &(read("robot.ttl") + "\n" + &measured.concat() + statements));
     let manifest = read("mission.toml");
     let files = "files = [\"robot.ttl\"]\n";
     assert!(manifest.contains(files), "{manifest}");
@@ -209,6 +214,18 @@ fn bounds_in_own_rules_are_candidates_for_changes() {
     assert_eq!(json!([answer["unexamined"], answer["repairs"][0]["then"]["cost"]]), json!([[], 1]));
     let situation = "--set wind=7 --set humidity=60";
     check_repairs(&[DRIFT], situation, &[&["humidity below 50"], &["wind at_most 6"]]);
+}
+
+/// Two measurements of one attribute have the same bound, so the changes differ only in the present values.
+#[test]
+fn changes_of_two_measurements_of_an_attribute_are_listed() {
+    let second = ":obs_second a t:QAvalue ; t:isQAtype :humidity ; t:isMeasured true ; t:hasValue 42 .\n";
+    let rule = FOG.replace("90", "30");
+    let text = explain_statements(second, &[&rule], "fd_first", "json");
+    let answer: Value = serde_json::from_str(&text).expect("JSON");
+    let repairs = answer["repairs"].as_array().expect("a list");
+    let bounds: Vec<&Value> = repairs.iter().map(|repair| &repair["changes"][0]["bound"]).collect();
+    assert_eq!((&answer["available"], bounds), (&json!(false), vec![&json!(30), &json!(30)]), "{answer:#}");
 }
 
 /// The wind has two bounds. Only the greater one suffices alone, and it makes the change of the humidity unnecessary.
