@@ -366,7 +366,7 @@ fn individuals_with_one_name_in_pddl_are_refused() {
             "<urn:m#effort>",
             "<urn:o#effort>",
         ),
-        (":go a t:Action ; t:requiresF :f .", "<urn:m#a_go>", "<urn:m#go>"),
+        (":go a t:Action ; t:requiresF :f , :g . :g a t:Function .", "<urn:m#a_go>", "<urn:m#go>"),
     ] {
         let messages = with_statements(statements).map(|_| ()).expect_err(statements);
         let messages: Vec<_> = messages.iter().collect();
@@ -386,6 +386,8 @@ fn equal_names_outside_of_the_problem_are_accepted() {
         "o:effort a t:QualityAttributeType .",
         "o:a_go a t:Action .",
         ":Effort a t:Component .",
+        // Both actions have the same requirements.
+        ":go a t:Action ; t:requiresF :f .",
     ] {
         let mission = with_statements(statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
         assert_eq!(answer(&mission).1.as_deref(), Some("1"), "{statements}");
@@ -433,6 +435,8 @@ fn values_with_the_prefix_of_measurements_can_be_estimations() {
         // A measured value replaces the estimations of all designs.
         (format!(":obs_b {value} ."), "5"),
         (format!(":qa_b {value} ; t:isMeasured true ."), "5"),
+        (format!(":qa_b {value} ; t:isMeasured true . :cost owl:sameAs :effort ."), "5"),
+        (format!(":qa_b {value} ; t:isMeasured true . :zeal owl:sameAs :effort ."), "5"),
     ] {
         let mission = with_statements(&statements).unwrap_or_else(|messages| panic!("{messages:#?}"));
         assert_eq!(answer(&mission).1.as_deref(), Some(cost), "{statements}");

@@ -179,7 +179,7 @@ struct StatisticsPart {
     /// Number of restarts of the satisficing search for a better plan.
     restarts: usize,
     /// Improved plans, and lower bounds that rose by more than one percent or to the cost of the plan, in
-    /// order.
+    /// order. If the metric depends on the state, a lower bound alone adds no entry.
     history: Vec<MomentPart>,
     /// Running times of the stages.
     milliseconds: MillisecondsPart,

@@ -41,8 +41,8 @@ pub struct Arguments {
     wanted: Wanted,
 }
 
-/// Options that state which functions need a design, what restricts the choice (requirements, budgets, exclusive
-/// components), and which designs are preferred.
+/// Options that state which functions need a design, what restricts the choice (budgets, exclusive components), and
+/// which designs are preferred (by requirements, then by the value of an attribute).
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Wanted {
     /// A required function, in addition to the objectives of the knowledge base (repeatable). Default: all

@@ -15,7 +15,8 @@ use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::progress::during;
 use crate::cli::values::{existing_directory, setting};
 
-/// A mission, or a domain and a problem, and the situation to plan for.
+/// Options for the situation to plan for: changes of the initial situation and, for a domain and a problem, the
+/// knowledge base. The input files are separate arguments.
 #[derive(Debug, Clone, Args)]
 pub(super) struct Situation {
     /// A knowledge base for DOMAIN and PROBLEM (OWL; repeatable).

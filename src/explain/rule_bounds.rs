@@ -397,7 +397,7 @@ fn targets(
 ) -> Option<Vec<Target>> {
     let bound = bound.clone();
     let order = from.cmp(&bound);
-    // `true` if the outcome at the bound is that of smaller values.
+    // `true` if the comparison has the same outcome at the bound as below it, so that it changes just above the bound.
     let changes_above = match built_in {
         BuiltIn::GreaterThan | BuiltIn::LessThanOrEqual => !is_swapped,
         BuiltIn::LessThan | BuiltIn::GreaterThanOrEqual => is_swapped,

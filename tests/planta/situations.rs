@@ -318,14 +318,23 @@ fn names_that_are_equal_in_pddl_are_refused() {
         3,
         &["M225", "<http://e.org/k#Cb>", "<http://o.org/k#Cb>"],
     );
-    check(
-        "DataPropertyAssertion(:pd :i0 \"hello world\") DataPropertyAssertion(:pd :i0 \"hello_world\")",
-        3,
-        &["M225", "\"hello world\"", "\"hello_world\""],
-    );
+    let values =
+        "DataPropertyAssertion(:pd :i0 \"hello world\") DataPropertyAssertion(:pd :i0 \"hello_world\")";
+    let used = format!("DataPropertyDomain(:pd :Cb) {values}");
+    check(&used, 3, &["M225", "\"hello world\"", "\"hello_world\""]);
+    // What the domain does not use may have equal names.
+    check(&format!("ClassAssertion(:Cb :i0) {values}"), 0, &[]);
+    let classes =
+        "Declaration(Class(:Cc)) Declaration(Class(o:Cc)) SubClassOf(:Cb o:Cc) ClassAssertion(o:Cc :i0)";
+    check(&format!("ClassAssertion(:Cb :i0) {classes}"), 0, &[]);
     // An individual and a class may have one name, because objects and predicates are different in PDDL.
     check("ClassAssertion(:Cb :i0) ClassAssertion(:Cb :ca)", 0, &[]);
     check("ClassAssertion(:Cb :i0) ClassAssertion(:Cb o:i0) SameIndividual(:i0 o:i0)", 0, &[]);
+    check(
+        "ClassAssertion(:Cb :i0) ClassAssertion(:Cb o:i0) SameIndividual(:i0 :j) SameIndividual(:j o:i0)",
+        0,
+        &[],
+    );
 }
 
 #[test]

@@ -454,15 +454,26 @@ pub(super) fn individuals(
     individuals
 }
 
-/// Returns the names of the attributes whose estimations or measurements are values of the functions of a domain.
-pub(super) fn attributes(domain: &Domain, bindings: &Bindings) -> BTreeSet<String> {
+/// Returns the names of the attributes whose estimations or measurements are values of the functions of a domain. The
+/// problem's value of a function takes precedence over a measurement.
+pub(super) fn attributes(domain: &Domain, problem: &Problem, bindings: &Bindings) -> BTreeSet<String> {
     let queries = domain.functions.iter().map(|declared| (declared, bindings.function(declared)));
     let attributes = queries.filter_map(|(declared, query)| match query {
         Query::Estimation(attribute) if declared.parameters.len() == 1 => Some(attribute),
-        Query::Measured(attribute) if declared.parameters.is_empty() => Some(attribute),
+        Query::Measured(attribute)
+            if declared.parameters.is_empty() && !has_value(problem, &declared.identifier.name) =>
+        {
+            Some(attribute)
+        }
         _ => None,
     });
     attributes.flat_map(|attribute| [plain(&attribute).to_owned(), attribute]).collect()
+}
+
+pub(super) fn has_value(problem: &Problem, function: &Name) -> bool {
+    problem.init.iter().any(
+        |element| matches!(element, InitialElement::Value(atom, _, _) if atom.predicate.name == *function),
+    )
 }
 
 /// Returns `true` if the action has the name `only`, or if there is no such name.

@@ -56,6 +56,7 @@ impl Mission {
             let (lacks, names) = match kind {
                 "estimation" | "chosen" | "reconfigured" => ("no design has an estimation of", &estimated),
                 "measured" => ("there is no measurement of", &measured),
+                "action" if catalogue.actions().iter().any(|own| own.individual.iri == name) => return None,
                 "action" | "requires" => ("the knowledge base has no action", &actions),
                 "class" if catalogue.members(&view, name).is_empty() => {
                     ("the knowledge base has no individuals of", &empty)

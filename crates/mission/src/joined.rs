@@ -129,8 +129,8 @@ impl Mission {
             (Some(knowledge), Some(planta)) => names::merged_by_planta(knowledge, planta),
             (Some(knowledge), None) => {
                 let adaptation = adaptation.as_ref();
-                let mut errors = names::merged(&domain, knowledge, &bindings, adaptation);
-                errors.extend(several_values(&domain, knowledge, &bindings, adaptation));
+                let mut errors = names::merged(&domain, &problem, knowledge, &bindings, adaptation);
+                errors.extend(several_values(&domain, &problem, knowledge, &bindings, adaptation));
                 errors
             }
             (None, _) => Vec::new(),

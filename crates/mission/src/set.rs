@@ -56,15 +56,16 @@ impl Mission {
             );
             return Err(Message::error("M106", text));
         }
-        let arity = |declared: &[Declaration]| {
-            let declared = declared.iter().find(|d| d.identifier.name == symbol && self.is_settable(d));
-            declared.map(|declared| declared.parameters.len())
-        };
         let arguments: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
-        if arity(&self.domain.functions) == Some(arguments.len()) {
+        let function = self.domain.functions.iter().find(|declared| declared.identifier.name == symbol);
+        if function.is_some_and(|declared| declared.parameters.len() == arguments.len()) {
             return self.set_value(&symbol, &arguments, value);
         }
-        match (arity(&self.domain.predicates), value.to_ascii_lowercase().as_str()) {
+        let mut predicates = self.domain.predicates.iter().filter(|declared| self.is_settable(declared));
+        let arity = predicates
+            .find(|declared| declared.identifier.name == symbol)
+            .map(|declared| declared.parameters.len());
+        match (arity, value.to_ascii_lowercase().as_str()) {
             (Some(arity), truth @ ("true" | "false")) if arity == arguments.len() => {
                 let holds = truth == "true";
                 if !holds {
@@ -172,7 +173,7 @@ impl Mission {
         self.problem.init.extend(replacement);
     }
 
-    /// Returns `true` unless only the explicit form of a plain domain has the symbol. Users cannot set such symbols.
+    /// Returns `true` unless only the explicit form of a plain domain has the symbol. Users cannot set such predicates.
     fn is_settable(&self, declared: &Declaration) -> bool {
         self.adaptation.as_ref().is_none_or(|adaptation| !adaptation.is_added(&declared.identifier.name))
     }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use num_rational::BigRational;
 use ontology::ANONYMOUS;
 use ontology::tomasys::{Estimation, Individual, Measurement};
-use pddl::ast::Domain;
+use pddl::ast::{Domain, Problem};
 
 use crate::binding::{self, Bindings};
 use crate::knowledge::{Knowledge, doubt_about};
@@ -17,12 +17,13 @@ use crate::native::CoAdaptation;
 /// form of the domain.
 pub(crate) fn several_values(
     domain: &Domain,
+    problem: &Problem,
     knowledge: &Knowledge,
     bindings: &Bindings,
     adaptation: Option<&CoAdaptation>,
 ) -> Vec<Message> {
     let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
-    let mut attributes = binding::attributes(domain, bindings);
+    let mut attributes = binding::attributes(domain, problem, bindings);
     attributes.extend(adaptation.into_iter().flat_map(CoAdaptation::attributes));
     let mut errors = Vec::new();
     for design in catalogue.designs() {

@@ -251,12 +251,18 @@ impl<'a> View<'a> {
                     && value.name.starts_with("obs_")
                     && self.subjects(&value.iri, terms::HAS_ESTIMATION).is_empty()
         };
-        let measurement = |individual: Individual| {
-            let attribute = self.objects(&individual.iri, terms::IS_TYPE).into_iter().next()?.name;
+        // One for each name of the attribute.
+        let measurements = |individual: Individual| {
             let value = self.number(&individual.iri, terms::HAS_VALUE);
-            Some(Measurement { individual, attribute, value })
+            let attributes = self.objects(&individual.iri, terms::IS_TYPE).into_iter();
+            let measurement = |attribute: Individual| Measurement {
+                individual: individual.clone(),
+                attribute: attribute.name,
+                value: value.clone(),
+            };
+            attributes.map(measurement).collect::<Vec<_>>()
         };
-        self.members(terms::QA_VALUE).into_iter().filter(measured).filter_map(measurement).collect()
+        self.members(terms::QA_VALUE).into_iter().filter(measured).flat_map(measurements).collect()
     }
 
     /// Returns all actions with the functions that they require, sorted by IRI.

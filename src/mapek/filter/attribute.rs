@@ -135,8 +135,9 @@ impl Hold {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Verdict {
-    /// Newly believed value. The value differs from the sample if the sample satisfies some violated bounds by less
-    /// than their hysteresis, or if it crosses further bounds than the confirmed ones.
+    /// Newly believed value: the sample, except in two cases. If the sample satisfies a violated bound by less than
+    /// the bound's hysteresis, the value still violates this bound. If the crossing of a bound is not confirmed yet,
+    /// the value has not crossed it.
     Accepted(BigRational),
     Held(Hold),
 }

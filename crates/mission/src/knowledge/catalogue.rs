@@ -125,7 +125,11 @@ impl Catalogue {
             if literals.len() > 1 {
                 literals.sort_by_cached_key(ToString::to_string);
             }
-            self.measurements[place].value = literals.into_iter().find_map(Literal::as_rational);
+            let value = literals.into_iter().find_map(Literal::as_rational);
+            let iri = self.measurements[place].individual.iri.clone();
+            for own in self.measurements.iter_mut().filter(|own| own.individual.iri == iri) {
+                own.value.clone_from(&value);
+            }
             return true;
         }
         if OTHER_CLASSES.contains(&property) {

@@ -6,28 +6,31 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ontology::Iri;
 use ontology::tomasys::{Individual, View};
-use pddl::ast::{Domain, Name};
+use pddl::ast::{Domain, Name, Problem};
 
 use crate::binding::{self, Bindings};
 use crate::knowledge::{Knowledge, doubt_about};
 use crate::message::Message;
 use crate::native::CoAdaptation;
-use crate::planta::Planta;
+use crate::planta::{Merged, Planta};
 
 /// Returns an error for each pair of individuals that would be merged. `domain` is the explicit form of the domain.
 pub(crate) fn merged(
     domain: &Domain,
+    problem: &Problem,
     knowledge: &Knowledge,
     bindings: &Bindings,
     adaptation: Option<&CoAdaptation>,
 ) -> Vec<Message> {
     let view = knowledge.view();
-    let mut pairs = pairs(&view, binding::individuals(domain, knowledge, bindings), |individual| {
-        Name::new(&individual.name)
-    });
-    let mut attributes = binding::attributes(domain, bindings);
+    let objects = pairs(&view, binding::individuals(domain, knowledge, bindings), |own| Name::new(&own.name));
+    // The objects of a plain domain are not part of the problem, so that no other object can be named.
+    let can_be_mapped = adaptation.is_none();
+    let mut errors: Vec<Message> =
+        objects.iter().map(|(first, second)| error(knowledge, first, second, can_be_mapped)).collect();
+    let mut pairs = Vec::new();
+    let mut attributes = binding::attributes(domain, problem, bindings);
     if let Some(adaptation) = adaptation {
         pairs.extend(self::pairs(&view, adaptation.requirements(), |own| Name::new(&own.name)));
         attributes.extend(adaptation.attributes());
@@ -42,14 +45,15 @@ pub(crate) fn merged(
         let used = used.filter(|own| attributes.contains(&own.name));
         pairs.extend(self::pairs(&view, used.collect(), |own| own.name.clone()));
     }
-    pairs.iter().map(|(first, second)| error(knowledge, first, second)).collect()
+    errors.extend(pairs.iter().map(|(first, second)| error(knowledge, first, second, false)));
+    errors
 }
 
 /// Returns an error for each pair of entities or values that would be merged in PLANTA's form.
 pub(crate) fn merged_by_planta(knowledge: &Knowledge, planta: &Planta) -> Vec<Message> {
-    let error = |(iri, text): &(Option<Iri>, String)| match iri {
-        Some(iri) => doubt_about(knowledge, "M225", iri, text.clone()).into_error(),
-        None => Message::error("M225", text.as_str()),
+    let error = |pair: &Merged| match &pair.iri {
+        Some(iri) => doubt_about(knowledge, "M225", iri, pair.text.clone()).into_error(),
+        None => Message::error("M225", pair.text.as_str()),
     };
     planta.merged().iter().map(error).collect()
 }
@@ -76,10 +80,14 @@ fn pairs<K: Ord>(
     pairs
 }
 
-fn error(knowledge: &Knowledge, first: &Individual, second: &Individual) -> Message {
+fn error(knowledge: &Knowledge, first: &Individual, second: &Individual, can_be_mapped: bool) -> Message {
+    let mapping = if can_be_mapped {
+        ", or give it the name of another object of the problem in `[bindings.names]`, by its IRI"
+    } else {
+        ""
+    };
     let text = format!(
-        "`{}` would be both <{}> and <{}>, because PDDL ignores namespaces and case; rename one of them, or give it the \
-         name of another object of the problem in `[bindings.names]`, by its IRI",
+        "`{}` would be both <{}> and <{}>, because PDDL ignores namespaces and case; rename one of them{mapping}",
         second.name, first.iri, second.iri
     );
     doubt_about(knowledge, "M225", &second.iri, text).into_error()

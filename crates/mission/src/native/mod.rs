@@ -32,7 +32,7 @@ use pddl::ast::{
     EffectTime, Expression, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
 };
 
-use crate::binding::{Bindings, add_values, atom, identifier, is_pddl_name};
+use crate::binding::{Bindings, add_values, atom, has_value, identifier, is_pddl_name};
 use crate::message::{Errors, Message};
 use walk::{mentions, walk_uncounted};
 
@@ -93,7 +93,11 @@ impl CoAdaptation {
             });
             let Some(known_action) = matching.next() else { continue };
             let iri = &known_action.individual.iri;
-            if let Some(other) = matching.find(|other| !view.are_same(iri, &other.individual.iri)) {
+            let differs = |other: &&ontology::tomasys::Action| {
+                (&other.requires, &other.quality) != (&known_action.requires, &known_action.quality)
+                    && !view.are_same(iri, &other.individual.iri)
+            };
+            if let Some(other) = matching.find(differs) {
                 let text = format!(
                     "the action `{name}` corresponds to both <{iri}> and <{other}>; bind it to one of them: `{name} = \
                      \"action:{iri}\"`",
@@ -318,7 +322,11 @@ impl CoAdaptation {
     /// from that for a chosen design if both are used, because only a change is free without an estimation.
     fn change_of(&self, attribute: &str) -> String {
         if self.chosen.values().any(|chosen| chosen == attribute) {
-            value_of(&format!("reconfigured_{attribute}"))
+            let mut name = format!("reconfigured_{attribute}");
+            while self.chosen.values().any(|own| Name::new(own) == Name::new(&name)) {
+                name.push('_');
+            }
+            value_of(&name)
         } else {
             value_of(attribute)
         }
@@ -585,12 +593,6 @@ fn attributes(
         }
     }
     (chosen, changed)
-}
-
-fn has_value(problem: &Problem, function: &Name) -> bool {
-    problem.init.iter().any(
-        |element| matches!(element, InitialElement::Value(atom, _, _) if atom.predicate.name == *function),
-    )
 }
 
 fn estimated<'a>(designs: impl Iterator<Item = &'a FunctionDesign>) -> BTreeSet<String> {

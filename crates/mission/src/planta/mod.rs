@@ -22,7 +22,7 @@ mod terms;
 use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 
-use ontology::{Iri, Ontology};
+use ontology::Ontology;
 use pddl::ast::{Domain, InitialElement, Name, Problem, Term};
 use pddl::{Mentioned, Source};
 use rules::{Engine, Fact, Literal, Value};
@@ -31,6 +31,7 @@ use crate::message::{Message, did_you_mean};
 use complete::drop_repeated;
 use names::{EQUAL, LESS, NUMBER_TYPES, UNGROUND, UNREALISABLE};
 use syntax::{Fact as PddlFact, atom, object};
+pub(crate) use terms::Merged;
 pub use terms::Terms;
 
 /// Returns the translation of an ontology to PDDL if the domain is in PLANTA's form: it uses undeclared
@@ -69,6 +70,7 @@ impl Planta {
         let mut warnings = std::mem::take(&mut terms_of_mission.warnings);
         warnings.extend(drop_repeated(domain, problem));
         let mentioned = Mentioned::by_domain(domain).and_problem(problem);
+        terms_of_mission.omit_unused(&mentioned);
         let types = mentioned::types(domain, problem);
         let is_used = |r#type: &&&str| types.contains(&Name::new(r#type));
         let number = Name::new(NUMBER_TYPES.iter().find(is_used).unwrap_or(&NUMBER_TYPES[0]));
@@ -89,9 +91,8 @@ impl Planta {
         &self.known
     }
 
-    /// Returns the pairs of different entities or values of the knowledge base that have one name in PDDL: the IRI of
-    /// one of them, if it has one, and a description.
-    pub(crate) fn merged(&self) -> &BTreeSet<(Option<Iri>, String)> {
+    /// Returns the pairs of different entities or values of the knowledge base that have one name in PDDL.
+    pub(crate) fn merged(&self) -> &BTreeSet<Merged> {
         &self.terms.merged
     }
 

@@ -104,7 +104,7 @@ fn term(argument: &Argument, variables: &mut Variables, terms: &mut Terms) -> Te
     match argument {
         Argument::Variable(iri) => variable(&variables.name(iri)),
         Argument::Individual(iri) => Term::Constant(terms.individual(iri).into()),
-        Argument::Literal(literal) => Term::Constant(terms.literal(literal, true).into()),
+        Argument::Literal(literal) => Term::Constant(terms.literal(literal).into()),
     }
 }
 

@@ -10,6 +10,7 @@ use std::fmt;
 
 use ontology::vocab::{owl, pddl as annotation};
 use ontology::{ANONYMOUS, Axiom, ClassExpression, EntityKind, Iri, ObjectPropertyExpression, Ontology};
+use pddl::Mentioned;
 use pddl::ast::{Condition, Derived, Name, Term};
 use rules::Literal;
 
@@ -38,8 +39,20 @@ pub struct Terms {
     denoted: BTreeMap<Name, Denoted>,
     /// Sets of individuals that are stated to be the same.
     same: Vec<Vec<Iri>>,
-    /// Different entities or values that have one name in PDDL: IRI of one of them, if it has one, and description.
-    pub(super) merged: BTreeSet<(Option<Iri>, String)>,
+    /// Different entities or values that have one name in PDDL.
+    pub(super) merged: BTreeSet<Merged>,
+}
+
+/// Two entities or values that have one name in PDDL.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Merged {
+    /// Plain predicate without which the pair is irrelevant: the predicate of both, or the property that has a value.
+    pub(super) predicate: Option<Name>,
+    /// `true` if the pair has the name of a predicate, `false` if it has that of an object.
+    pub(super) is_predicate: bool,
+    /// One of the entities.
+    pub(crate) iri: Option<Iri>,
+    pub(crate) text: String,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -125,9 +138,9 @@ impl Terms {
                     self.individual(own);
                     self.individual(other);
                 }
-                Axiom::DataPropertyAssertion(_, own, value) => {
+                Axiom::DataPropertyAssertion(property, own, value) => {
                     self.individual(own);
-                    self.literal(value, false);
+                    self.constant_of(value, false, Some(names::plain(property)));
                 }
                 _ => {}
             }
@@ -140,21 +153,26 @@ impl Terms {
 
     pub(super) fn individual(&mut self, iri: &Iri) -> Name {
         let name = names::plain(iri);
-        self.denote(&name, Denoted::Individual(iri.clone()));
+        self.denote(&name, Denoted::Individual(iri.clone()), None);
         if !iri.starts_with(ANONYMOUS) {
             self.constants.entry(name.clone()).or_insert(None);
         }
         name
     }
 
+    /// Returns the constant of a literal in a rule, and declares it.
+    pub(super) fn literal(&mut self, literal: &ontology::Literal) -> Name {
+        self.constant_of(literal, true, None)
+    }
+
     /// Returns the constant of a literal, and declares it. Numbers are declared only if they occur
-    /// in rules.
-    pub(super) fn literal(&mut self, literal: &ontology::Literal, in_rule: bool) -> Name {
+    /// in rules. `property` is the plain predicate of the assertion in which the literal occurs.
+    fn constant_of(&mut self, literal: &ontology::Literal, in_rule: bool, property: Option<Name>) -> Name {
         let (datatype, language) = (literal.datatype.as_deref(), literal.language.as_deref());
         let value = Literal::parse(&literal.lexical, datatype, language);
         self.literals.insert(value.clone(), names::literal(&literal.lexical, datatype));
         let name = self.literals.name(&value);
-        self.denote(&name, Denoted::Value(value.clone()));
+        self.denote(&name, Denoted::Value(value.clone()), property);
         if !value.is_numeric() {
             self.constants.entry(name.clone()).or_insert(None);
         } else if in_rule {
@@ -164,15 +182,14 @@ impl Terms {
     }
 
     /// Records the individual or value of a constant. Reports it if the constant already denotes another one.
-    fn denote(&mut self, name: &Name, denoted: Denoted) {
+    /// `predicate` is [`Merged::predicate`].
+    fn denote(&mut self, name: &Name, denoted: Denoted, predicate: Option<Name>) {
         let Some(other) = self.denoted.get(name) else {
             self.denoted.insert(name.clone(), denoted);
             return;
         };
         let is_same = match (other, &denoted) {
-            (Denoted::Individual(other), Denoted::Individual(iri)) => {
-                other == iri || self.same.iter().any(|same| same.contains(other) && same.contains(iri))
-            }
+            (Denoted::Individual(other), Denoted::Individual(iri)) => self.are_same(other, iri),
             (other, denoted) => other == denoted,
         };
         if !is_same {
@@ -180,8 +197,22 @@ impl Terms {
                 Denoted::Individual(iri) => Some(iri.clone()),
                 Denoted::Value(_) => None,
             };
-            self.merged.insert((iri, one_name(name, &other.to_string(), &denoted.to_string())));
+            let text = one_name(name, &other.to_string(), &denoted.to_string());
+            self.merged.insert(Merged { predicate, is_predicate: false, iri, text });
         }
+    }
+
+    /// Returns `true` if two individuals are the same by a chain of statements.
+    fn are_same(&self, first: &Iri, second: &Iri) -> bool {
+        let (mut reached, mut pending) = (BTreeSet::from([first]), vec![first]);
+        while let Some(iri) = pending.pop() {
+            for other in self.same.iter().filter(|same| same.contains(iri)).flatten() {
+                if reached.insert(other) {
+                    pending.push(other);
+                }
+            }
+        }
+        reached.contains(second)
     }
 
     /// Reports different classes and properties that have one predicate.
@@ -191,11 +222,52 @@ impl Terms {
             match first_by_name.get(name) {
                 Some(first) => {
                     let text = one_name(name, &format!("<{first}>"), &format!("<{iri}>"));
-                    self.merged.insert((Some(iri.clone()), text));
+                    let (predicate, iri) = (Some(name.clone()), Some(iri.clone()));
+                    self.merged.insert(Merged { predicate, is_predicate: true, iri, text });
                 }
                 None => {
                     first_by_name.insert(name, iri);
                 }
+            }
+        }
+    }
+
+    /// Omits the pairs of entities with one name that are irrelevant for a domain and a problem that mention
+    /// `mentioned`. Removes the predicates of these pairs, so that a later mention is an error.
+    pub(super) fn omit_unused(&mut self, mentioned: &Mentioned) {
+        if self.merged.is_empty() {
+            return;
+        }
+        let used = self.used(mentioned);
+        let is_used = |name: &Name| used.contains(name) || used.contains(&names::inferred(name));
+        let unused: BTreeSet<Name> = self
+            .merged
+            .iter()
+            .filter(|pair| pair.is_predicate)
+            .filter_map(|pair| pair.predicate.clone())
+            .filter(|name| !is_used(name))
+            .collect();
+        self.merged.retain(|pair| pair.predicate.as_ref().is_none_or(is_used));
+        self.symbols.retain(|_, name| !unused.contains(name));
+        self.predicates
+            .retain(|name, _| !unused.iter().any(|own| own == name || names::inferred(own) == *name));
+        if !unused.is_empty() {
+            self.derived.retain(|axiom| used.contains(&axiom.head.identifier.name));
+        }
+    }
+
+    /// Returns the mentioned predicates, and those on which their axioms depend.
+    fn used(&self, mentioned: &Mentioned) -> BTreeSet<Name> {
+        let mut used = mentioned.predicates.clone();
+        loop {
+            let mut more = Mentioned::default();
+            for axiom in self.derived.iter().filter(|axiom| used.contains(&axiom.head.identifier.name)) {
+                more.condition(&axiom.condition);
+            }
+            let count = used.len();
+            used.extend(more.predicates);
+            if used.len() == count {
+                return used;
             }
         }
     }

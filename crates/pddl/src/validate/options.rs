@@ -22,7 +22,7 @@ pub struct Options {
     pub tolerance: BigRational,
     /// Whether a step may lack a duration that no equality determines. The step then takes the shortest time
     /// that its constraints allow, or the longest time if the metric rewards time, as the planner chooses without
-    /// overlapping actions. The default is `false`: such a step violates the plan.
+    /// overlapping actions. The default is `false`: such a step makes the plan invalid.
     pub chosen_durations: bool,
 }
 

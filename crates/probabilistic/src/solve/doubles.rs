@@ -1,5 +1,5 @@
-//! Bounds the values that policy iteration has computed in doubles. Several methods are tried until
-//! the bounds are tight.
+//! Bounds the values that policy iteration has computed in doubles. If the first bounds are not tight,
+//! further methods are tried. Finite bounds are improved only if that is cheap, so they may stay wide.
 
 use num_rational::BigRational;
 

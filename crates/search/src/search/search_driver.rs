@@ -183,8 +183,9 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
     }
 
     /// Makes a search continue if memory is forecast to run out before it finishes. Without this setting,
-    /// such a search ends. A continued search gets at most half of the work of `max_states` states in
-    /// [`Self::run`]. The first call of [`Self::run`] ignores this setting.
+    /// such a search ends. While its last forecast is unfavourable, a search does at most half of the work
+    /// that [`Self::run`] otherwise allows for `max_states`. The first call of [`Self::run`] ignores this
+    /// setting.
     #[must_use]
     pub fn continue_without_forecast(self) -> Self {
         Self { is_patient: true, ..self }

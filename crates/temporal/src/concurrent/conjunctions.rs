@@ -1,10 +1,10 @@
 //! Explicit conjunctions in the delete relaxation, for facts that no action adds again.
 //!
-//! A relaxed plan deletes nothing, so an action that deletes a fact needed later looks useful even
-//! if nothing adds the fact again. Up to work limits, the relaxed task gets, for each such fact,
-//! conjunctions of this fact with propositions that are needed at the same time and that rules which
-//! delete the fact help to achieve. Only rules that keep the fact achieve these conjunctions. They
-//! are conjunctions of two facts as in the task Π^C \[1\], for a few selected facts.
+//! A relaxed plan deletes nothing. So an action that deletes a fact looks useful even if the fact is
+//! needed later and nothing adds it again. For each such fact f, the relaxed task gets conjunctions
+//! f ∧ p, up to work limits. Here p is a proposition that is needed together with f, and that a rule
+//! deleting f would help to achieve. Only rules that keep f achieve f ∧ p. These are conjunctions of
+//! two facts as in the task Π^C \[1\], for a few selected facts.
 //!
 //! \[1\] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through
 //! explicitly represented conjunctions, JAIR 50, 2014.

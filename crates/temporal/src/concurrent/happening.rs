@@ -55,8 +55,8 @@ pub(super) struct Instance<T: TimeNumber = Int> {
     pub(super) most: u32,
     /// Fact that the action is running. `None` if at most one simultaneous run can be useful.
     pub(super) under_way: Option<Fact>,
-    /// `true` if several simultaneous runs can be useful, but a run whose end does not change the state is
-    /// useless.
+    /// `true` if a run is useless whenever its end does not change the state; the search prunes such an end.
+    /// Always `false` if at most one simultaneous run can be useful.
     pub(super) counts_by_end: bool,
     /// `true` if the end can directly follow its start in every sequence of happenings without loss of
     /// completeness.

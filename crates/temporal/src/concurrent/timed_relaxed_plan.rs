@@ -249,7 +249,7 @@ impl<'a, T: TimeNumber> TimedRelaxation<'a, T> {
             Timing::End(instance) => {
                 let (start, duration) = self.starts[instance as usize];
                 let end = if start < NEVER { start } else { at }.saturating_add(duration);
-                // Facts of an end hold for other happenings a separation later.
+                // Other happenings can use facts that the end achieves only one separation after the end.
                 at = at.max(end).saturating_add(self.separation);
                 period = duration.saturating_add(self.separation);
                 is_action = 0;
