@@ -302,7 +302,7 @@ impl Relation {
     }
 
     /// Returns the index on the largest subset of the columns `bound`, and the columns of this index (bit masks).
-    /// Ignores indexes that omit the rows of a rule; `None` if no index fits.
+    /// Ignores indexes without the rows that one rule has derived; `None` if no index fits.
     pub fn best_index(&self, bound: u32) -> Option<(usize, u32)> {
         let fits = |index: &Index| index.columns & !bound == 0 && index.excluded_rule.is_none();
         let usable = self.indexes.iter().enumerate().filter(|(_, index)| fits(index));

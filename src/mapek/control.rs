@@ -79,7 +79,7 @@ struct Agenda {
     is_start: bool,
 }
 
-/// Copy of the state that deliberation can change before its first search.
+/// Copy of the state that deliberation can change until it stops because a plan is missing.
 #[derive(Debug)]
 pub(super) struct Checkpoint {
     agenda: Option<Agenda>,
@@ -306,7 +306,8 @@ impl Loop {
         }
     }
 
-    /// Restores the state at the checkpoint. Deliberation must not have searched since then.
+    /// Restores the state at the checkpoint. Deliberation must have stopped since then because a plan was missing:
+    /// requests and changes that follow a plan are not undone.
     pub(super) fn roll_back(&mut self, to: Checkpoint) {
         let beliefs = &mut self.beliefs;
         self.agenda = to.agenda;

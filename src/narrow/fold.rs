@@ -48,7 +48,8 @@ impl Folded {
         Self { settled, possible }
     }
 
-    /// Returns the predicates on whose facts the result of [`facts`](Self::facts) depends.
+    /// Returns the predicates in the bodies of the clauses that [`facts`](Self::facts) evaluates. Its result depends on
+    /// the initial facts of these predicates and of the vocabulary.
     pub fn premises(&self) -> BTreeSet<&Name> {
         let clauses = self.settled.values().flatten().chain(self.possible.clauses());
         clauses.flat_map(|clause| &clause.body).filter_map(Literal::name).collect()

@@ -23,7 +23,7 @@ use crate::message::Message;
 pub struct Terms {
     /// Arity of each plain and each inferred predicate.
     pub(super) predicates: BTreeMap<Name, usize>,
-    /// Plain predicate of each class and property.
+    /// Predicate for the asserted facts of each class and property: the plain name, without `inferred-`.
     pub(super) symbols: BTreeMap<Iri, Name>,
     /// Plain predicates of functional data properties.
     pub(super) functional: BTreeSet<Name>,

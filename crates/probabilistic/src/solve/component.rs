@@ -318,8 +318,8 @@ fn stay<N: Number>(local: &Local<N>, ends: &EndComponents, state: usize) -> u32 
     choices.find(|choice| ends.alive[*choice]).map_or(NONE, |choice| local.choices[choice])
 }
 
-/// Builds the equations of a component without end components: each state is its own block. The rows are moved
-/// out of `local`, and their self-loops are eliminated. Choices that only loop get no row.
+/// Builds the equations of a component in which no end components are merged: each state is its own block. The
+/// rows are moved out of `local`, and their self-loops are eliminated. Choices that only loop get no row.
 fn unmerged<N: Number>(local: &mut Local<N>) -> Quotient<N> {
     let mut rows = std::mem::replace(&mut local.rows, Rows::new());
     let (mut first, mut choices, mut begin) = (vec![0], Vec::with_capacity(local.choices.len()), 0);

@@ -35,8 +35,9 @@ impl Resource {
     }
 }
 
-/// Returns the resources of a task. A projection is omitted if an operator may replenish the
-/// resource in each of its abstract states.
+/// Returns the resources of a task, each with its needs in the projections. A projection is omitted
+/// from a resource if an operator that may replenish this resource neither requires nor changes the
+/// pattern: all needs would be 0.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of a task are above the least number of their type"

@@ -1,10 +1,11 @@
-//! Durations that depend on the state or that the planner chooses. One numeric fluent per schema
-//! holds the duration, from the start to the end of an action.
+//! Durations that depend on the state or that the planner chooses. One numeric function per schema
+//! holds the duration, or its dividend, from the start to the end of an action.
 //!
 //! `?duration` has the value of the duration expression in the state in which the action starts
-//! \[1\]. The start assigns this value to the fluent; the readers of the fluent (the end, its effects
-//! and the temporal network) divide it by a static expression, if necessary. If the planner chooses
-//! the duration, the start assigns nothing. An auxiliary operator, which is never executed, increases
+//! \[1\]. The start assigns this value to the fluent. If the expression is a quotient with a static
+//! divisor, the start assigns only the dividend, and the readers of the fluent (the end, its effects
+//! and the temporal network) divide by the divisor. If the planner chooses the duration, the start
+//! assigns nothing. An auxiliary operator, which is never executed, increases
 //! the fluent, so that every value from 0 is reachable in the relaxed task.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 5.2.
