@@ -173,6 +173,40 @@ fn functions_of_places_may_have_names_of_attributes() {
     }
 }
 
+/// Objects without a type are accepted with a warning, so the function has values for the designs.
+#[test]
+fn functions_of_designs_have_values_for_objects_without_a_type() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).expect("a file");
+    let design = |name: &str, speed: u32| {
+        format!(
+            ":{name} a t:FunctionDesign ; t:solvesF :f ;
+               t:hasQAestimation [ a t:QAvalue ; t:isQAtype :speed ; t:hasValue {speed} ] .\n"
+        )
+    };
+    let prefixes = "@prefix : <http://e.org/k#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
+                    @prefix t: <http://metacontrol.org/tomasys#> .\n";
+    let head = "<http://e.org/k> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .\n\
+                :speed a t:QualityAttributeType .\n:f a t:Function .\n";
+    write("kb.ttl", &[prefixes, head, &design("fd_a", 3), &design("fd_b", 2)].concat());
+    write(
+        "domain.pddl",
+        "(define (domain d) (:requirements :typing :numeric-fluents) (:types design)
+           (:predicates (done) (fd_solve_f ?d ?f) (fd_available ?d))
+           (:functions (speed ?d - design) (total-cost))
+           (:action go :parameters (?d ?f) :precondition (and (fd_solve_f ?d ?f) (fd_available ?d))
+             :effect (and (done) (increase (total-cost) (speed ?d)))))",
+    );
+    write(
+        "problem.pddl",
+        "(define (problem p) (:domain d) (:objects fd_a fd_b f) (:init (= (total-cost) 0)) (:goal (done))
+           (:metric minimize (total-cost)))",
+    );
+    let outcome =
+        metaplan_in(directory.path(), &["plan", "domain.pddl", "problem.pddl", "--kb", "kb.ttl"], "");
+    assert!(outcome.status == 0 && outcome.stdout.contains("cost 2: optimal"), "{outcome:#?}");
+}
+
 #[test]
 fn missing_and_negative_numbers_are_warnings() {
     let misspelt = (

@@ -607,12 +607,18 @@ impl Fill<'_> {
         }
     }
 
-    /// Returns the names of the objects that are arguments of a parameter with this type.
-    fn fitting(&self, domain: &Domain, r#type: &TypeExpression) -> HashSet<Name> {
+    /// Returns `true` if one of these objects can be an argument of a parameter with this type. As in the check of the
+    /// problem, an object without a type, or with an undeclared one, can be.
+    fn admits(&self, domain: &Domain, r#type: &TypeExpression, names: &HashSet<Name>) -> bool {
         let hierarchy = TypeHierarchy::of(domain);
+        let root = Name::new("object");
+        let is_free = |own: &TypeExpression| {
+            own.alternatives.iter().all(|own| own.name == root)
+                || own.alternatives.iter().any(|own| !hierarchy.contains(&own.name))
+        };
         let objects = domain.constants.iter().chain(&self.problem.objects);
-        let fitting = objects.filter(|object| hierarchy.fits(&object.r#type, r#type));
-        fitting.map(|object| object.identifier.name.clone()).collect()
+        let mut objects = objects.filter(|object| names.contains(&object.identifier.name));
+        objects.any(|object| is_free(&object.r#type) || hierarchy.fits(&object.r#type, r#type))
     }
 
     fn values(&mut self, domain: &Domain, declared: &Declaration, bindings: &Bindings) {
@@ -627,10 +633,14 @@ impl Fill<'_> {
                 // By default, a function is bound to the attribute of its name. Without the type of designs it is
                 // another function, for example of places.
                 if !values.is_empty() && !bindings.own.contains_key(name) {
-                    let fitting = self.fitting(domain, &declared.parameters[0].r#type);
-                    values.retain(|(arguments, _)| {
-                        arguments.iter().all(|argument| fitting.contains(&Name::new(argument)))
-                    });
+                    let designs: HashSet<Name> = values
+                        .iter()
+                        .flat_map(|(arguments, _)| arguments)
+                        .map(|name| Name::new(name))
+                        .collect();
+                    if !self.admits(domain, &declared.parameters[0].r#type, &designs) {
+                        values.clear();
+                    }
                 }
             }
             Query::Measured(attribute) if declared.parameters.is_empty() => {

@@ -372,10 +372,11 @@ fn unreadable_values(problem: &Problem) -> Vec<Message> {
         _ => None,
     });
     let error = |atom: &Atom| {
-        let arguments: String = atom.arguments.iter().map(|term| format!(" {}", term.name())).collect();
+        let words = std::iter::once(&atom.predicate.name).chain(atom.arguments.iter().map(Term::name));
+        let words: Vec<&str> = words.map(Name::as_str).collect();
         let text = format!(
-            "the value of `({}{arguments})` has more than 400 digits (from a setting or from the knowledge base)",
-            atom.predicate.name
+            "the value of `({})` has more than 400 digits (from a setting or from the knowledge base)",
+            words.join(" ")
         );
         Message::error("P105", text).with_help("write fewer digits")
     };

@@ -15,7 +15,7 @@ pub fn module(
     let target = |old: &str| pairs.iter().find(|(from, _)| from == old).map(|(_, to)| to.clone());
     let renamed = |old: &str| target(old).unwrap_or_else(|| old.to_owned());
     let expression = |e: &Expr| {
-        let expanded = expand_formulas(e, formulas, formulas.len());
+        let expanded = expand_formulas(e, formulas, &[]);
         expanded.replace(&|name| target(name).map(|name| Expr { kind: ExprKind::Name(name), place: e.place }))
     };
     let variable = |v: &Variable| Variable {
@@ -46,12 +46,12 @@ pub fn module(
     }
 }
 
-/// Expands the formulas in an expression up to a nesting depth. The depth limit ends the recursion of circular
-/// formulas.
-fn expand_formulas(expression: &Expr, formulas: &[Named], depth: usize) -> Expr {
-    let Some(depth) = depth.checked_sub(1) else { return expression.clone() };
+/// Expands the formulas in an expression, except those in `open`, the formulas that are being expanded. Circular
+/// formulas are errors, which are reported later.
+fn expand_formulas(expression: &Expr, formulas: &[Named], open: &[&str]) -> Expr {
     expression.replace(&|name| {
-        let formula = formulas.iter().find(|formula| formula.name == name)?;
-        Some(expand_formulas(&formula.expression, formulas, depth))
+        let formula = formulas.iter().find(|formula| formula.name == name && !open.contains(&name))?;
+        let open: Vec<&str> = open.iter().copied().chain([formula.name.as_str()]).collect();
+        Some(expand_formulas(&formula.expression, formulas, &open))
     })
 }
