@@ -95,10 +95,8 @@ impl Mission {
         };
         let (mut domain, mut problem, mut warnings) = (domain, problem, warnings);
         let terms = knowledge.as_ref().and_then(Knowledge::terms);
-        let unused = terms.map_or_else(Vec::new, |_| bindings.unused_in_planta());
-        if !unused.is_empty() {
-            return Err(unused.into());
-        }
+        let unused_bindings = terms.map_or_else(Vec::new, |_| bindings.unused_in_planta());
+        Errors::unless_empty(unused_bindings)?;
         let planta = terms.map(|terms| {
             let (planta, completed, more) = Planta::new(terms, &domain, &mut problem);
             domain = completed;

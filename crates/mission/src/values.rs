@@ -28,17 +28,20 @@ pub(crate) fn several_values(
     let mut errors = Vec::new();
     for design in catalogue.designs() {
         let estimations = view.estimations(&design.individual.iri).into_iter();
-        let used = estimations.filter(|estimation| attributes.contains(&estimation.attribute));
-        let values =
-            used.map(|Estimation { individual, attribute, value }| Held { individual, attribute, value });
+        let estimations = estimations.filter(|estimation| attributes.contains(&estimation.attribute));
+        let values = estimations.map(|Estimation { individual, attribute, value }| Held {
+            individual,
+            attribute,
+            value,
+        });
         let kind = format!("the design <{}> has two estimations", design.individual.iri);
         for (first, second) in different(values) {
             errors.push(error(knowledge, &kind, &design.individual, &first, &second));
         }
     }
     let measurements = catalogue.measurements().iter();
-    let used = measurements.filter(|measurement| attributes.contains(&measurement.attribute));
-    let values = used.cloned().filter_map(|Measurement { individual, attribute, value }| {
+    let measurements = measurements.filter(|measurement| attributes.contains(&measurement.attribute));
+    let values = measurements.cloned().filter_map(|Measurement { individual, attribute, value }| {
         Some(Held { individual, attribute, value: value? })
     });
     for (first, second) in different(values) {

@@ -35,15 +35,15 @@ pub(crate) fn merged(
         pairs.extend(self::pairs(&view, adaptation.requirements(), |own| Name::new(&own.name)));
         attributes.extend(adaptation.attributes());
     }
-    let used = view.used_attribute_types().into_iter();
+    let types = view.used_attribute_types().into_iter();
     if adaptation.is_some() {
         // The explicit form of a plain domain declares functions with the names of attributes.
         let attributes: BTreeSet<Name> = attributes.iter().map(|attribute| Name::new(attribute)).collect();
-        let used = used.filter(|own| attributes.contains(&Name::new(&own.name)));
-        pairs.extend(self::pairs(&view, used.collect(), |own| Name::new(&own.name)));
+        let types = types.filter(|own| attributes.contains(&Name::new(&own.name)));
+        pairs.extend(self::pairs(&view, types.collect(), |own| Name::new(&own.name)));
     } else {
-        let used = used.filter(|own| attributes.contains(&own.name));
-        pairs.extend(self::pairs(&view, used.collect(), |own| own.name.clone()));
+        let types = types.filter(|own| attributes.contains(&own.name));
+        pairs.extend(self::pairs(&view, types.collect(), |own| own.name.clone()));
     }
     errors.extend(pairs.iter().map(|(first, second)| error(knowledge, first, second, false)));
     errors

@@ -238,9 +238,9 @@ impl Terms {
         if self.merged.is_empty() {
             return;
         }
-        let used = self.used(mentioned);
-        let is_used = |name: &Name| used.contains(name) || used.contains(&names::inferred(name));
-        let unused: BTreeSet<Name> = self
+        let relevant = self.used(mentioned);
+        let is_used = |name: &Name| relevant.contains(name) || relevant.contains(&names::inferred(name));
+        let unused_predicates: BTreeSet<Name> = self
             .merged
             .iter()
             .filter(|pair| pair.is_predicate)
@@ -248,26 +248,28 @@ impl Terms {
             .filter(|name| !is_used(name))
             .collect();
         self.merged.retain(|pair| pair.predicate.as_ref().is_none_or(is_used));
-        self.symbols.retain(|_, name| !unused.contains(name));
-        self.predicates
-            .retain(|name, _| !unused.iter().any(|own| own == name || names::inferred(own) == *name));
-        if !unused.is_empty() {
-            self.derived.retain(|axiom| used.contains(&axiom.head.identifier.name));
+        self.symbols.retain(|_, name| !unused_predicates.contains(name));
+        self.predicates.retain(|name, _| {
+            !unused_predicates.iter().any(|own| own == name || names::inferred(own) == *name)
+        });
+        if !unused_predicates.is_empty() {
+            self.derived.retain(|axiom| relevant.contains(&axiom.head.identifier.name));
         }
     }
 
     /// Returns the mentioned predicates, and those on which their axioms depend.
     fn used(&self, mentioned: &Mentioned) -> BTreeSet<Name> {
-        let mut used = mentioned.predicates.clone();
+        let mut predicates = mentioned.predicates.clone();
         loop {
-            let mut more = Mentioned::default();
-            for axiom in self.derived.iter().filter(|axiom| used.contains(&axiom.head.identifier.name)) {
-                more.condition(&axiom.condition);
+            let mut bodies = Mentioned::default();
+            for axiom in self.derived.iter().filter(|axiom| predicates.contains(&axiom.head.identifier.name))
+            {
+                bodies.condition(&axiom.condition);
             }
-            let count = used.len();
-            used.extend(more.predicates);
-            if used.len() == count {
-                return used;
+            let count = predicates.len();
+            predicates.extend(bodies.predicates);
+            if predicates.len() == count {
+                return predicates;
             }
         }
     }

@@ -12,7 +12,7 @@
 //!    1991).
 //! 3. Policy iteration solves the Markov chain of each policy directly.
 //! 4. In doubles, the error of the result is bounded by a certificate (`certify`) or by another method
-//! (`doubles`).
+//!    (`doubles`).
 //!
 //! Small components of a simple form are solved by shortest paths instead (`ways`).
 
