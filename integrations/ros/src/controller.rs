@@ -175,7 +175,7 @@ impl Controller {
             let _ = sender.try_send(solve(Request { domain, problem, joint: Some(&mission) }, &manner));
         };
         let outcome = match on_a_thread("plan", work) {
-            Ok(_) => {
+            Ok(()) => {
                 let ended = |_| Err(NoPlan::Fault("the planner has ended".to_owned()));
                 receiver.recv().await.unwrap_or_else(ended)
             }
