@@ -375,8 +375,8 @@ pub(super) fn fill(
 ) -> Vec<Message> {
     let catalogue = knowledge.catalogue();
     let is_known = knowledge.fault().is_none();
-    let mut fill =
-        Fill { problem, view: knowledge.view(), known: catalogue, is_known, own, warnings: Vec::new() };
+    let (view, hierarchy) = (knowledge.view(), TypeHierarchy::of(domain));
+    let mut fill = Fill { problem, view, known: catalogue, is_known, own, hierarchy, warnings: Vec::new() };
     let types = domain.types.iter().map(|declared| &declared.identifier.name);
     let symbols = domain.predicates.iter().chain(&domain.functions).map(|declared| &declared.identifier.name);
     let actions = domain.actions.iter().map(|action| &action.identifier.name);
@@ -499,6 +499,7 @@ struct Fill<'a> {
     /// as available.
     is_known: bool,
     own: &'a BTreeSet<Name>,
+    hierarchy: TypeHierarchy,
     warnings: Vec<Message>,
 }
 
@@ -610,13 +611,13 @@ impl Fill<'_> {
     /// Returns `true` if one of these objects can be an argument of a parameter with this type. As in the check of the
     /// problem, an object without a type, or with an undeclared one, can be.
     fn admits(&self, domain: &Domain, r#type: &TypeExpression, names: &HashSet<Name>) -> bool {
-        let hierarchy = TypeHierarchy::of(domain);
-        let root = Name::new("object");
+        let (hierarchy, root) = (&self.hierarchy, Name::new("object"));
         let is_free = |own: &TypeExpression| {
             own.alternatives.iter().all(|own| own.name == root)
                 || own.alternatives.iter().any(|own| !hierarchy.contains(&own.name))
         };
-        let objects = domain.constants.iter().chain(&self.problem.objects);
+        // The designs of the knowledge base are the last objects.
+        let objects = self.problem.objects.iter().rev().chain(&domain.constants);
         let mut objects = objects.filter(|object| names.contains(&object.identifier.name));
         objects.any(|object| is_free(&object.r#type) || hierarchy.fits(&object.r#type, r#type))
     }

@@ -7,7 +7,7 @@ use pddl::ast::{Atom, Condition, Direction, Domain, InitialElement, Metric, Name
 use pddl::{self, Diagnostic, Severity, Source};
 use tracing::info_span;
 
-use crate::binding::Bindings;
+use crate::binding::{self, Bindings};
 use crate::file::{self, Kind};
 use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message};
@@ -127,8 +127,10 @@ impl Mission {
             (Some(knowledge), Some(planta)) => names::merged_by_planta(knowledge, planta),
             (Some(knowledge), None) => {
                 let adaptation = adaptation.as_ref();
-                let mut errors = names::merged(&domain, &problem, knowledge, &bindings, adaptation);
-                errors.extend(several_values(&domain, &problem, knowledge, &bindings, adaptation));
+                let mut attributes = binding::attributes(&domain, &problem, &bindings);
+                attributes.extend(adaptation.into_iter().flat_map(CoAdaptation::attributes));
+                let mut errors = names::merged(&domain, knowledge, &bindings, adaptation, &attributes);
+                errors.extend(several_values(knowledge, &attributes));
                 errors
             }
             (None, _) => Vec::new(),

@@ -1,30 +1,18 @@
 //! Finds attributes with several different values: of a design, or measured. No rule decides which of them counts, so
 //! that plans would depend on the order of the statements.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use num_rational::BigRational;
 use ontology::ANONYMOUS;
 use ontology::tomasys::{Estimation, Individual, Measurement};
-use pddl::ast::{Domain, Problem};
 
-use crate::binding::{self, Bindings};
 use crate::knowledge::{Knowledge, doubt_about};
 use crate::message::Message;
-use crate::native::CoAdaptation;
 
-/// Returns an error for each pair of different values of an attribute that the problem uses. `domain` is the explicit
-/// form of the domain.
-pub(crate) fn several_values(
-    domain: &Domain,
-    problem: &Problem,
-    knowledge: &Knowledge,
-    bindings: &Bindings,
-    adaptation: Option<&CoAdaptation>,
-) -> Vec<Message> {
+/// Returns an error for each pair of different values of one of the attributes that the problem uses.
+pub(crate) fn several_values(knowledge: &Knowledge, attributes: &BTreeSet<String>) -> Vec<Message> {
     let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
-    let mut attributes = binding::attributes(domain, problem, bindings);
-    attributes.extend(adaptation.into_iter().flat_map(CoAdaptation::attributes));
     let mut errors = Vec::new();
     for design in catalogue.designs() {
         let estimations = view.estimations(&design.individual.iri).into_iter();

@@ -109,6 +109,11 @@ pub fn to_decimal(value: &BigRational) -> Option<String> {
 
 /// Returns `true` if the parser accepts `value` as it is printed. It refuses numbers of more than 400 digits.
 pub fn is_readable(value: &BigRational) -> bool {
+    // A printed number has at most one digit for each bit of its numerator and denominator, and a leading zero. Most
+    // numbers are thus accepted without being printed.
+    if value.numer().bits().saturating_add(value.denom().bits()) < MAX_DIGITS as u64 {
+        return true;
+    }
     let digits = |text: &str| text.bytes().filter(u8::is_ascii_digit).count();
     match to_decimal(value) {
         Some(decimal) => digits(&decimal) <= MAX_DIGITS,

@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use ontology::tomasys::{Individual, View};
-use pddl::ast::{Domain, Name, Problem};
+use pddl::ast::{Domain, Name};
 
 use crate::binding::{self, Bindings};
 use crate::knowledge::{Knowledge, doubt_about};
@@ -15,38 +15,32 @@ use crate::message::Message;
 use crate::native::CoAdaptation;
 use crate::planta::{Merged, Planta};
 
-/// Returns an error for each pair of individuals that would be merged. `domain` is the explicit form of the domain.
+/// Returns an error for each pair of individuals that would be merged. `domain` is the explicit form of the domain,
+/// `attributes` contains the names of the attributes that the problem uses.
 pub(crate) fn merged(
     domain: &Domain,
-    problem: &Problem,
     knowledge: &Knowledge,
     bindings: &Bindings,
     adaptation: Option<&CoAdaptation>,
+    attributes: &BTreeSet<String>,
 ) -> Vec<Message> {
     let view = knowledge.view();
-    let objects = pairs(&view, binding::individuals(domain, knowledge, bindings), |own| Name::new(&own.name));
-    // The objects of a plain domain are not part of the problem, so that no other object can be named.
-    let can_be_mapped = adaptation.is_none();
-    let mut errors: Vec<Message> =
-        objects.iter().map(|(first, second)| error(knowledge, first, second, can_be_mapped)).collect();
-    let mut pairs = Vec::new();
-    let mut attributes = binding::attributes(domain, problem, bindings);
-    if let Some(adaptation) = adaptation {
-        pairs.extend(self::pairs(&view, adaptation.requirements(), |own| Name::new(&own.name)));
-        attributes.extend(adaptation.attributes());
-    }
+    let name = |individual: &Individual| Name::new(&individual.name);
+    let objects = pairs(&view, binding::individuals(domain, knowledge, bindings), name);
     let types = view.used_attribute_types().into_iter();
-    if adaptation.is_some() {
+    let symbols = if let Some(adaptation) = adaptation {
         // The explicit form of a plain domain declares functions with the names of attributes.
         let attributes: BTreeSet<Name> = attributes.iter().map(|attribute| Name::new(attribute)).collect();
-        let types = types.filter(|own| attributes.contains(&Name::new(&own.name)));
-        pairs.extend(self::pairs(&view, types.collect(), |own| Name::new(&own.name)));
+        let types = types.filter(|own| attributes.contains(&name(own))).collect();
+        [pairs(&view, adaptation.requirements(), name), pairs(&view, types, name)].concat()
     } else {
-        let types = types.filter(|own| attributes.contains(&own.name));
-        pairs.extend(self::pairs(&view, types.collect(), |own| own.name.clone()));
-    }
-    errors.extend(pairs.iter().map(|(first, second)| error(knowledge, first, second, false)));
-    errors
+        let types = types.filter(|own| attributes.contains(&own.name)).collect();
+        pairs(&view, types, |own| own.name.clone())
+    };
+    // The objects of a plain domain are not part of the problem, so that no other object can be named.
+    let can_be_mapped = adaptation.is_none();
+    let objects = objects.iter().map(|(first, second)| error(knowledge, first, second, can_be_mapped));
+    objects.chain(symbols.iter().map(|(first, second)| error(knowledge, first, second, false))).collect()
 }
 
 /// Returns an error for each pair of entities or values that would be merged in PLANTA's form.
