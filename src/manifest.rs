@@ -47,8 +47,8 @@ pub enum Part {
     Value,
     /// The key of the entry.
     Key,
-    /// Offset in bytes within a string value. If the file does not contain the string literally,
-    /// for example because of escapes, the beginning of the string is used.
+    /// Offset in bytes within a string value. If the string is written with escapes or three quotes, its
+    /// beginning is used.
     Inside(usize),
 }
 
@@ -65,7 +65,7 @@ pub struct ManifestPath {
 ///
 /// # Errors
 /// The file cannot be read or is not a manifest; otherwise the faults of its sections and keys. If the file does not
-/// exist, the message proposes a similar name.
+/// exist, the message proposes a similar name, if there is one.
 pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Errors> {
     let source = source(file).map_err(|error| {
         let text = error.message.clone() + &file_suggestion(file);
@@ -131,7 +131,7 @@ impl ManifestPath {
 
     /// Returns the line and the column of an entry of the manifest. Returns `None` for the empty
     /// path, or if the text cannot be parsed. If the entry does not exist, returns the position of
-    /// the nearest existing table or array that would contain it.
+    /// the last existing entry on the path.
     pub fn place_of(&self, path: &[Key], part: Part) -> Option<(usize, usize)> {
         let document = DeTable::parse(&self.text).ok()?;
         let mut span = document.span();
@@ -171,7 +171,7 @@ impl ManifestPath {
     /// Converts a value to an exact number. `key` is the name of the value for messages.
     ///
     /// # Errors
-    /// The value is not a non-negative decimal, or it has too many digits.
+    /// The value is not a non-negative decimal, or its text or exponent is too large.
     pub fn number(&self, key: &str, value: &Spanned<toml::Value>) -> Result<BigRational, Message> {
         let text = match value.get_ref() {
             toml::Value::String(text) => text.clone(),
@@ -193,7 +193,7 @@ pub fn decimal(_: &mut SchemaGenerator) -> Schema {
 }
 
 /// Returns `; did you mean …?` for a file that does not exist: with the same name and the extension `.toml`, or the most
-/// similar name of a file `*.toml` in the directory. Returns an empty text if there is no such file.
+/// similar name of a file `*.toml` in the directory. Returns an empty text if no name is similar.
 fn file_suggestion(file: &Path) -> String {
     let completed = file.with_extension("toml");
     let written = if completed.is_file() { &completed } else { file };

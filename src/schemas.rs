@@ -19,9 +19,9 @@ use crate::sweep::{self, SweepAnswer};
 /// to satisfy one of them.
 type Entry = (&'static str, &'static str, fn() -> Vec<Schema>);
 
-/// The formats with a schema, by name. The name of an answer format is its field `format` without the prefix
-/// `metaplan-` and without the version, e.g. `plan` for `metaplan-plan/1`. The format `check` includes
-/// `metaplan-checks/1`.
+/// The formats with a schema, each with its name. After the first four, the name is the field `format` of an answer
+/// without the prefix `metaplan-` and without the version, e.g. `plan` for `metaplan-plan/1`. The format `check`
+/// includes `metaplan-checks/1`.
 pub const FORMATS: [Entry; 25] = [
     ("manifest", "a mission's manifest", || vec![setup::schema()]),
     ("study", "a study of metaplan sweep", || vec![sweep::schema()]),

@@ -75,7 +75,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Reads a manifest, and the files that it names.
+    /// Reads a manifest with its knowledge base, domain and problem.
     ///
     /// ```
     /// use std::path::Path;
@@ -89,7 +89,7 @@ impl Setup {
     /// ```
     ///
     /// # Errors
-    /// The faults of the manifest's text; otherwise those of its settings and of the files that it names; otherwise
+    /// The faults of the manifest's text; otherwise those of its settings, bindings and the files that are read; otherwise
     /// names in the settings of filters that the knowledge base does not have, and faults of the section
     /// `probabilistic`. Faulty settings hide faults that only the whole mission shows. Scenarios are not checked; see
     /// [`Setup::mistakes`].
@@ -98,7 +98,7 @@ impl Setup {
         Self::of(sections, origin)
     }
 
-    /// Parses the text of a manifest and reads the files that it names. Their paths are relative to
+    /// Parses the text of a manifest and reads its knowledge base, domain and problem. Their paths are relative to
     /// `directory`. Messages use `name` as the file name of the manifest.
     ///
     /// # Errors

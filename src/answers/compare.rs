@@ -77,7 +77,7 @@ fn values(measures: &Measures) -> [Option<f64>; 12] {
     ]
 }
 
-/// Returns one table row for each given candidate, without a row for the hindsight bounds (lower bounds for a
+/// Returns one table row for each given candidate, without a row for the hindsight bounds (lower bounds from a
 /// clairvoyant controller).
 pub fn begun_rows(pair: Option<&Pair>, candidates: &[Candidate]) -> Vec<Row> {
     let measured = candidates
@@ -87,7 +87,7 @@ pub fn begun_rows(pair: Option<&Pair>, candidates: &[Candidate]) -> Vec<Row> {
 }
 
 /// Returns the table rows of a complete comparison: one for each candidate, and one for the hindsight bounds (lower
-/// bounds for a clairvoyant controller).
+/// bounds from a clairvoyant controller).
 pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
     let mut rows = begun_rows(pair, &comparison.candidates);
     let [time, energy] = comparison.hindsight;

@@ -124,8 +124,8 @@ fn write_member(
     write_with(directory, &contents, [], limits)
 }
 
-/// Returns the sum of operator costs of a plan with this value of the metric. Returns `None` if no plan has this value,
-/// or if the sum exceeds 128 bits.
+/// Returns the sum of operator costs that corresponds to this value of the metric. Returns `None` if the sum is not
+/// integral, so that no plan has this value, or if it exceeds 128 bits.
 fn operator_costs(task: &Task, value: &Exact) -> Option<i128> {
     let scaled = value.to_rational() * BigInt::from(task.objective.scale);
     let scaled = if task.objective.maximize { -scaled } else { scaled };

@@ -24,7 +24,7 @@ const INTERVAL: Duration = Duration::from_millis(10);
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct SoFar {
-    /// Total number of comparisons. `None` while files are read.
+    /// Total number of comparisons. `None` before the first one begins.
     pub of: Option<usize>,
     pub done: Vec<(Option<Pair>, Comparison)>,
     pub begun: Option<Begun>,

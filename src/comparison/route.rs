@@ -5,7 +5,7 @@ use num_rational::BigRational;
 use crate::comparison::coadaptation::{Coadaptation, Switch, Traversal};
 use crate::comparison::process::Action;
 
-/// Returns the fastest actions that follow a route of arcs; the configuration can be changed before each arc.
+/// Returns the fastest actions that follow a route of arcs; the configuration can be changed once before each arc.
 /// Returns `None` if the route cannot be traversed with the available configurations. The battery is ignored.
 pub fn best_on_route(mission: &Coadaptation, route: &[usize]) -> Option<Vec<Action>> {
     best_by(mission, route, |traversal| traversal.time.clone(), |switch| switch.time.clone())

@@ -181,8 +181,8 @@ impl Keeper {
         self.numbers.greatest()
     }
 
-    /// Returns the gaps between sequence numbers of accepted lines, as inclusive ranges `[first, last]`. The missing
-    /// lines have not arrived yet, or were refused.
+    /// Returns the gaps between sequence numbers of accepted lines, as inclusive ranges `[first, last]`; if there are
+    /// more than 255, the last 255. The missing lines have not arrived yet, or were refused.
     pub fn missing(&self) -> Vec<[u64; 2]> {
         self.numbers.missing()
     }

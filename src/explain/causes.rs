@@ -177,7 +177,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
     availability
 }
 
-/// Returns minimal sets of `candidates` that make a design available (see [`minimal`]). At most
+/// Returns minimal sets of `candidates` that make a design available (see [`minimal`]). After the largest sets, at most
 /// [`MAX_TRIED`] sets are tried, small ones first, so some minimal sets may be missing. Also returns `true` if all sets
 /// were tried, and reasoning did not fail.
 fn repairs(

@@ -207,8 +207,8 @@ mod tests {
             last.map(|effect| effect.supersedes.clone())
         };
         assert_eq!(superseded(&beliefs), Some(vec![1]));
-        // After the acknowledgement of effect 3, no copy of an earlier reconfiguration can be in transit, so the next
-        // one supersedes none.
+        // After the acknowledgement of effect 3, copies of earlier reconfigurations are not expected any more, so the
+        // next one supersedes none.
         let _ = beliefs.acknowledge(3);
         request(&mut beliefs, step("fd_amcl_kinect"), &mut answers);
         assert_eq!(superseded(&beliefs), Some(Vec::new()));

@@ -1,9 +1,9 @@
 //! Decides whether the action under way continues, is suspended, or is cancelled, if it may have to be interrupted.
 //!
 //! Cancelling an action loses its progress. Therefore, the mission is planned twice: beginning with the remaining part
-//! of the action, and as if the action had been cancelled. The action is cancelled if only the second plan exists, or
-//! if the second plan is better by at least the minimum benefit; otherwise the first plan is adopted if it exists. If
-//! neither plan exists, the action is suspended until suitable designs are available again, unless it can continue with
+//! of the action, and as if the action had been cancelled. The action is cancelled if only the second plan is found,
+//! or if the second plan is better by at least the minimum benefit; otherwise the first plan is adopted if it is found.
+//! If neither plan is found, the action is suspended until suitable designs are available again, unless it can continue with
 //! its current designs. Robots that cannot suspend an action report that it was cancelled.
 
 use num_rational::BigRational;
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn an_action_is_interrupted_only_with_a_benefit() {
+    fn an_action_is_interrupted_with_a_benefit_or_if_no_plan_continues_it() {
         let cancel = |because: &str| Interruption::Cancel { because: format!("it is lost; {because}") };
         let suspend = Interruption::Suspend {
             status: "unsolvable",

@@ -1,7 +1,7 @@
 //! Explains an unsolvable mission by a minimal set of unavailable designs.
 //!
-//! The explanation is sought if the mission has no plan, but would have one with all designs
-//! available. Designs are made available one by one, and a design stays available if there is still
+//! The explanation is sought if the mission has no plan, but would have one with all designs of the
+//! knowledge base available. Designs are made available one by one, and a design stays available if there is still
 //! no plan. The remaining set of unavailable designs is minimal: with any one of them available,
 //! there would be a plan. This is the deletion-based search for a minimal unsatisfiable core [1],
 //! with the planner in place of the SAT solver; its proofs hold for plans of every length.
@@ -20,11 +20,11 @@ use crate::mission::planning::ground_with;
 /// Reason why a mission is unsolvable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Blocking {
-    /// Minimal set of unavailable designs, sorted by local name. The mission has no plan while all of them are
-    /// unavailable, even if every other design is available. If any one of them becomes available, in addition to all
-    /// other designs, the mission has a plan.
+    /// Minimal set of unavailable designs of the knowledge base, sorted by local name. The mission has no plan while all
+    /// of them are unavailable, even if every other design of the knowledge base is available. If any one of them
+    /// becomes available, in addition to all other designs of the knowledge base, the mission has a plan.
     Designs(Vec<String>),
-    /// Designs are not the reason: the mission has no plan even if every design is available.
+    /// Designs of the knowledge base are not the reason: the mission has no plan even if all of them are available.
     Other,
 }
 

@@ -84,8 +84,8 @@ pub fn written(atom: &Atom) -> String {
 /// Converts errors to faults with offsets in `text`. The text was parsed on the first line of an
 /// input, after a prefix of `before` characters.
 fn faults(errors: Errors, text: &str, before: usize) -> Vec<Fault> {
-    // Faults in the prefix are not about the text. A fault at an added parenthesis gets the place
-    // of the text's first character.
+    // Faults in the prefix are not about the text. A fault at an added opening parenthesis gets the
+    // place of the text's first character.
     let is_own =
         |error: &Message| error.line != Some(1) || error.column.is_none_or(|column| column >= before);
     let fault = |error: Message| {

@@ -74,7 +74,8 @@ pub(super) fn verdict_of(
 
 /// Checks a plan by executing it with the independent validator. `problem` was returned by
 /// [`Mission::filled`]. Since plans are often found at the time limit, the validator gets the
-/// additional time of [`Limits::extended`].
+/// additional time of [`Limits::extended`]. The cost is not compared if the metric is undefined after
+/// the plan.
 ///
 /// # Errors
 /// The plan is invalid, its cost differs, or the time does not suffice.

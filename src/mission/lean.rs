@@ -2,8 +2,9 @@
 //!
 //! If the metric is the makespan, an action that overlaps with another one may cost nothing, so the
 //! planner may keep superfluous actions. Each action of cost 0, from the last to the first, is
-//! removed if the plan without it is valid and has the same cost. Plans of more than `MAX_ACTIONS`
-//! actions are not examined.
+//! removed if the plan without it is valid and has the same cost. Unlike in [1], actions are removed
+//! one at a time, never together with the actions that depend on them. Plans of more than
+//! `MAX_ACTIONS` actions are not examined.
 //!
 //! [1] H. Nakhost, M. Müller: Action elimination and plan neighborhood graph search, ICAPS 2010.
 

@@ -260,8 +260,8 @@ pub struct Mistake {
 }
 
 impl Mistake {
-    /// Returns `true` if the PDDL checker found the mistake. This is reliable only if the mission's
-    /// own files are correct.
+    /// Returns `true` if the PDDL checker found the mistake. If the mission's own files are faulty, such a
+    /// mistake may be in these files.
     pub fn is_of_pddl(&self) -> bool {
         self.message.code.starts_with('P')
     }

@@ -62,7 +62,7 @@ pub(super) fn of_type(r#type: &Name) -> Name {
 
 /// Converts a derived predicate to clauses without equalities. Supports conjunctions, disjunctions and existential
 /// quantifiers over atoms, equalities and negated equalities. Returns `None` for other conditions, for repeated
-/// variable names, for variables with several types, and if a limit is exceeded.
+/// variable names (except in alternative disjuncts), for variables with several types, and if a limit is exceeded.
 pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     let head = &derived.head;
     let mut variables: BTreeSet<Name> = BTreeSet::new();

@@ -226,7 +226,7 @@ impl Relations<'_> {
         let Some((part, remaining)) = order.split_first() else { return visit(bindings) };
         let free = part.operands().into_iter().find(|operand| value(operand, bindings).is_none());
         match (part, free) {
-            // No atom binds this variable, so it ranges over all objects.
+            // No conjunct before the inequality binds this variable, so it ranges over all objects.
             (Literal::Equal(..), Some(Operand::Variable(name))) => {
                 for object in self.objects {
                     bindings.insert(name, object);

@@ -42,8 +42,8 @@ pub(crate) fn narrowed<'t>(
     }
 }
 
-/// Computes a smaller domain and problem. Changes only derived predicates in `completed`, and those whose axioms
-/// mention only such predicates and bind all their variables. `completed` contains the predicates of the knowledge
+/// Computes a smaller domain and problem. Removes unused derived predicates. Of the others, changes only those in
+/// `completed`, and those whose axioms mention only such predicates and bind all their variables. `completed` contains the predicates of the knowledge
 /// base; the domain can have axioms of its own for them. Other predicates, e.g. of maps and tasks, may have large
 /// extensions, so grounding handles them.
 fn narrow(domain: &Domain, problem: &Problem, completed: &HashSet<Name>) -> (Domain, Problem) {

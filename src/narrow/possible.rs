@@ -3,8 +3,8 @@
 //! An open predicate, which actions can change, stays derived. Its parameters have no types, so grounding would try all
 //! objects. Often few objects are possible, because only facts that actions add can extend the predicate. If these
 //! facts can be bounded, the predicate gets a companion `possible-…`: a static predicate that is true wherever the open
-//! predicate can be true. In every state, an atom of the predicate is equivalent to its conjunction with the
-//! companion's atom. With this conjunction, grounding enumerates few objects for each variable.
+//! predicate can be true. In every reachable state, an atom of the predicate is equivalent to its conjunction with
+//! the companion's atom. With this conjunction, grounding enumerates few objects for each variable.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -102,7 +102,7 @@ impl Possible {
         self.clauses.iter()
     }
 
-    /// Returns the facts that actions may add, except additions with an argument that no class restricts.
+    /// Returns the facts that actions may add, except additions with a variable that no class restricts.
     /// `fixed` contains the initial facts and those of settled predicates. It is only searched for members of
     /// classes, which never change.
     pub fn added(&self, fixed: &BTreeSet<Fact>) -> BTreeSet<Fact> {

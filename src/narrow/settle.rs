@@ -2,7 +2,8 @@
 //! clauses.
 //!
 //! A predicate is *open* if an action or a timed initial literal changes it, or if it has an axiom that is not a
-//! clause. It is also open if one of its clauses has an open atom in the body. Axioms about domains and ranges of
+//! clause. It is also open if one of its clauses has an open atom in the body, or if it is outside of the vocabulary
+//! (see `fold`). Axioms about domains and ranges of
 //! properties make nearly every predicate open: for example, `(functionGrounding ?f ?fd)` implies that `?f` is a
 //! function and `?fd` is a function design. Such a clause derives nothing new if all facts of the predicate have
 //! arguments of the right class anyway. This is so if the initial facts have such arguments, and every action that adds

@@ -104,7 +104,7 @@ pub struct Suave {
 }
 
 impl Simulation {
-    /// Settings of a world without disturbances. Observations are reported every `step`, the
+    /// Settings of a world without disturbances. Observations are reported at least every `step`, the
     /// mission ends after `time_budget`, and an action that has stalled for `patience` fails.
     pub fn new(step: f64, time_budget: f64, patience: f64) -> Self {
         Self {

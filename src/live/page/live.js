@@ -187,13 +187,13 @@ function take(message) {
   if (news.known) return know(news.known), showDesigns();
   if (news.planned) {
     state.requested = Math.max(state.requested, news.planned.under_way ?? 0);
-    // A search for a better plan can end with `plan_none` although the current plan is kept.
+    // If a run is resumed from a journal, no answer reports the plan that exists already.
     if (news.planned.exists) state.plan = "found";
     showState();
     return drawPlan();
   }
   const said = news.said;
-  // Any answer other than `planning` means that the search has ended.
+  // If the search goes on, the next `planning` shows its time again.
   state.planning = undefined;
   CHANGES[said.answer]?.(said);
   showState();

@@ -226,7 +226,7 @@ impl<'m> Numbers<'m> {
     }
 
     /// Adds the negative durations of an action to `negative`. Considers only durations that follow from values that
-    /// nothing changes.
+    /// no action changes.
     fn negative_durations(&self, action: &Action, negative: &mut BTreeSet<NegativeDuration>) {
         let ActionBody::Durative { duration, .. } = &action.body else { return };
         let conditions = conditions(&action.body);
