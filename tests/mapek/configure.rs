@@ -228,8 +228,7 @@ fn a_failed_design_is_replaced_and_requested_again_once_realisable() {
     let answers =
         deliver(&mut keeper, r#"{"event":"objective_added","objective":"o1","function":"f_look","seq":1}"#);
     assert_eq!(reconfigurations(&answers), [("o1", None, Some("fd_look_close"))]);
-    // After the refusal, the second-best design is requested, and the best design again once it is
-    // realisable.
+    // After the refusal, the second-best design is requested.
     let answers = deliver(&mut keeper, r#"{"event":"reconfiguration_failed","effect":1,"seq":2}"#);
     assert_eq!(reconfigurations(&answers), [("o1", None, Some("fd_look_far"))]);
     assert_eq!(reconfigurations(&deliver(&mut keeper, r#"{"event":"acknowledged","effect":2}"#)), []);
@@ -312,7 +311,6 @@ fn a_design_that_cannot_be_kept_is_withdrawn() {
     );
 }
 
-/// A filter is not changed by a refused measurement.
 #[test]
 fn a_refused_measurement_does_not_change_its_filter() {
     let knowledge = Knowledge::read(&Sources {

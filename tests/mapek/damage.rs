@@ -305,7 +305,7 @@ fn a_second_fault_during_a_cancellation_is_recorded() {
 /// A rule infers a failure that contradicts the component's own report. Both statements are kept, the failure
 /// takes precedence, and the contradiction is reported.
 #[test]
-fn a_failure_that_contradicts_a_conclusion_is_recorded() {
+fn an_inferred_failure_that_contradicts_a_report_is_recorded() {
     let place = (0..100).map(generated).find(|place| !place.depends.is_empty()).expect("a mission");
     let (dependent, failing) = place.depends[0].clone();
     let mut control = place.started.clone();

@@ -62,7 +62,7 @@ fn a_refused_design_is_not_requested_until_it_is_realisable_again() {
 }
 
 #[test]
-fn an_observed_design_is_kept_unless_a_change_has_a_benefit() {
+fn a_better_design_than_the_observed_one_is_requested() {
     let mut control = control("ugv");
     let answers = control.start();
     deliver(&mut control, &Event::Acknowledged { effect: effect(&answers) });

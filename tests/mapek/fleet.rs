@@ -1,4 +1,4 @@
-//! Tests with a hundred robots in one process, each with a loop over SUAVE's own knowledge base.
+//! Tests with up to a hundred robots in one process, each with a loop over SUAVE's own knowledge base.
 #![expect(clippy::print_stdout, reason = "figures are what these tests are for")]
 
 use std::time::{Duration, Instant};

@@ -165,7 +165,7 @@ fn check(cuts: usize) {
             robot.take(&control, &answers);
         }
         drop(journal);
-        // The last one or two lines of the last segment are missing or incomplete. Only unsent effects may be
+        // Up to two lines at the end of the last segment are missing or incomplete. Only unsent effects may be
         // lost, so the robot forgets the effects that it received for the lost lines.
         let last = last_segment(directory.path());
         let text = std::fs::read(&last).expect("a journal");

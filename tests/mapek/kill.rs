@@ -150,7 +150,7 @@ fn run(story: &Story, random: &mut fastrand::Rng, kills: usize) -> (Robot, usize
     // Some runs end after few kills.
     while killed < kills && (killed == 0 || random.u32(..10) > 0) {
         let mut program = Program::start(story.mission, directory.path());
-        // In some cases the program is killed before its first output.
+        // In some cases the program is killed soon after its start, possibly before its first output.
         if random.u32(..8) == 0 {
             std::thread::sleep(Duration::from_micros(random.u64(..20_000)));
         } else {

@@ -1,4 +1,4 @@
-//! Tests of the adaptation loop and of the configuration loop (without plans) as a library: the paper's
+//! Tests of the adaptation loop and of the configuration loop (without plans), mostly as a library: the paper's
 //! experiments event by event, acknowledgements, faults and noise, the journals under crashes and damage, and
 //! random events.
 

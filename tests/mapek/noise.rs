@@ -61,7 +61,7 @@ fn a_noisy_light_costs_one_reconfiguration() {
     assert_eq!(filtered[0]["because"], "hysteresis");
 }
 
-/// Bounds in rules are in the manifest. Their keys say on which side designs are lost.
+/// The manifest lists the bounds in rules. Its keys say on which side of a bound designs are lost.
 #[test]
 fn a_sample_that_violates_a_bound_of_a_rule_counts_at_once() {
     let samples = [0.45, 0.505, 0.52, 0.495];

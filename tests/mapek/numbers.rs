@@ -1,4 +1,4 @@
-//! Tests of sequence numbers: no line is lost, and no number blocks later numbers. Tests of memory: the state
+//! Tests of sequence numbers: late lines are accepted, and no number blocks later numbers. Tests of memory: the state
 //! does not grow with the history.
 #![expect(clippy::print_stdout, reason = "the table is what the long test is for")]
 

@@ -381,7 +381,7 @@ fn an_unfinished_search_is_repeated() {
 }
 
 #[test]
-fn a_planner_that_never_ends_does_not_delay_the_safe_effect() {
+fn safe_effects_do_not_wait_for_planning() {
     let mut ugv = with(|settings| settings.with_time_limit(None));
     let start = Instant::now();
     for _ in 0..50 {

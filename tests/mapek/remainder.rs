@@ -63,8 +63,7 @@ fn effect(random: &mut Rng, is_durative: bool) -> String {
     if is_quantified { format!("(forall (?t - tank) {effect})") } else { effect }
 }
 
-/// Returns a domain with a random action `go`, a problem that `go` alone solves if it is executable, and a text that
-/// describes both.
+/// Returns a domain with a random action `go`, and a problem that `go` alone solves if it is executable.
 fn random_action(random: &mut Rng) -> (String, String) {
     let is_durative = random.u32(..4) > 0;
     let count = random.usize(1..5);
@@ -85,7 +84,7 @@ fn random_action(random: &mut Rng) -> (String, String) {
     for _ in 0..count {
         let effect = effect(random, is_durative);
         let time = pick(random, &["at start", "at end", "at end"]);
-        // The time is the innermost part of a quantified effect, and the outermost part of others.
+        // The time of a quantified effect is inside the quantifier.
         let _ = match effect.strip_prefix("(forall (?t - tank) ").and_then(|body| body.strip_suffix(')')) {
             _ if !is_durative => write!(effects, " {effect}"),
             Some(body) => write!(effects, " (forall (?t - tank) {})", timed(time, body)),
@@ -197,7 +196,8 @@ fn the_remainder_has_the_effects_of_a_success() {
 }
 
 /// Runs the loop for a domain with `header`, a durative action of 10 time units with `action`, and an action that
-/// reaches the goal. The first action has done half of its changes when an unrelated value changes.
+/// reaches the goal. The first action has done half of its changes when an unrelated value changes. Asserts that the
+/// plan is kept.
 fn check_half(header: &str, action: &str, last: &str, init: &str) {
     let domain = format!(
         "(define (domain d) (:requirements :typing :fluents :durative-actions :conditional-effects)

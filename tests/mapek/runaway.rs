@@ -1,5 +1,6 @@
 //! Tests with a rule that does not terminate: no report is refused, and no action starts while inferred facts
-//! are missing. Once the rule terminates, the state equals that of a loop without the rule.
+//! are missing. Once the rule terminates, designs and objectives have the same statuses as in a loop without the
+//! rule.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -25,8 +25,7 @@ pub fn resident() -> Option<usize> {
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// Returns the processor time of this process, which is independent of other processes; `None` without
-/// `/proc`.
+/// Returns the processor time of this process; `None` without `/proc`.
 pub fn processor_time() -> Option<Duration> {
     let status = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The fields after the name in parentheses contain user and system time in hundredths of a second.

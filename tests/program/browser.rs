@@ -122,7 +122,7 @@ fn pages_of_plans_work_in_a_browser() {
 }
 
 /// Ways that are used in both directions show the numbers of all their steps, each next to its own arrow;
-/// `check` tests this at both widths. Two plans are shown on a common time axis.
+/// `check_all` tests this at both widths. Two plans are shown on a common time axis.
 #[test]
 fn ways_in_both_directions_and_late_steps_are_visible() {
     let Some(browser) = browser() else { return };

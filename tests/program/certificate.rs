@@ -63,8 +63,8 @@ fn unsolvability_has_a_certificate() {
     }
 }
 
-/// If grounding finds the goal unreachable, the task is not completely pruned: it may lack an operator for an action
-/// that adds atoms which hold always, or that changes a number which nothing reads.
+/// If grounding finds the goal unreachable, the task is only partly pruned: an operator can be missing although its
+/// variables or numbers remain. The actions add atoms that always hold, or change a number that nothing reads.
 #[test]
 fn unreachable_goals_have_certificates() {
     let directory = tempfile::tempdir().expect("a directory");

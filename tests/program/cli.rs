@@ -331,7 +331,7 @@ fn numbers_of_any_size_are_supported() {
         outcome.stdout.contains("cost 340282366920938463463374607431768211456.2: optimal"),
         "{outcome:?}"
     );
-    // Options that need SAT formulas are refused.
+    // Options that planning with exact rationals does not support are refused.
     let directory = tempfile::tempdir().expect("a directory");
     let certificate = directory.path().join("certificate").display().to_string();
     check(

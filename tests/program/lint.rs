@@ -62,7 +62,7 @@ fn mistakes_in_the_section_probabilistic_are_errors() {
 }
 
 #[test]
-fn unused_names_are_warnings() {
+fn unused_and_unknown_names_are_reported() {
     check(
         &[("robot.ttl", ":a_pick a t:Action", ":a_pickup a t:Action")],
         1,

@@ -1,9 +1,9 @@
-//! Tests of errors in manifests: every command reports the errors with their positions, even in sections that
-//! the command does not use.
+//! Tests of errors in manifests: the commands report the errors with their positions, even in sections that
+//! they do not use.
 
 use crate::common::{headlines, metaplan_in, root};
 
-/// Checks that all commands reject a manifest with these lines, which begin at line 9, with the message
+/// Checks that several commands reject a manifest with these lines, which begin at line 9, with the message
 /// `expected`.
 fn check(lines: &str, expected: &str) {
     let directory = tempfile::tempdir().expect("a directory");
@@ -31,7 +31,7 @@ fn check(lines: &str, expected: &str) {
 }
 
 #[test]
-fn invalid_sections_are_refused_by_all_commands() {
+fn invalid_sections_are_refused_even_if_unused() {
     check(
         "[scenaros.s]",
         "9:2: error[M104]: unknown field `scenaros`, expected one of `name`, `description`, `knowledge`, `planning`, \

@@ -35,8 +35,8 @@ fn is_debug_text(text: &str) -> bool {
 }
 
 /// Returns the lines of an outcome that contain internal texts or paths with `..`, and the exit
-/// status if it is unexpected. Source lines and positions are excluded, because they are content of
-/// the user's files.
+/// status if it is unexpected. Source lines are excluded, because they are content of the user's
+/// files.
 fn faults(outcome: &Outcome) -> Vec<String> {
     let output = format!("{}{}", outcome.stdout, outcome.stderr);
     let message_lines = output.lines().filter(|line| !line.contains(" │"));

@@ -60,8 +60,7 @@ fn fraction(answer: &Answer) -> String {
 fn known_results_on_the_map_of_camara() {
     let Some(path) = data("real/map/map-p2cp3.json") else { return };
     let map = std::fs::read_to_string(path).expect("readable");
-    // More speeds yield more configurations, but not better results: slower speeds take more time and more
-    // energy.
+    // More speeds yield more configurations, but no less time or energy: slower speeds take more of both.
     for (speeds, configurations) in [(false, 6), (true, 18)] {
         known_results(&map, speeds, configurations);
     }
@@ -128,7 +127,7 @@ fn planned(mission: &Mission) -> Option<f64> {
     }
 }
 
-/// Returns `true` if there is a plan.
+/// Asserts that the process and the planner have the same optimum. Returns `true` if there is a plan.
 fn agree(label: &str, setup: &Setup, risk: Risk) -> bool {
     let (process, plan) = (least_time(&coadaptation(setup), risk), planned(&setup.mission));
     let is_equal = match (&process, plan) {
@@ -384,7 +383,7 @@ fn a_failed_change_of_configuration_ends_a_plan_that_is_not_replanned() {
         metaplan_in(directory.path(), &["compare", "domain.pddl", "problem.pddl", "--format", "json"], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     let answer = &outcome.json()["comparisons"][0];
-    // The plan takes 1, so a failed mission costs 10. The other candidates repeat the change until it succeeds.
+    // The plan takes 1, so a failed mission costs 10. The candidates `a` and `c` repeat the change until it succeeds.
     for (kind, goal, time, penalised) in [
         ("a", 1.0, 1.0, 1.0),
         ("b", 0.5, 0.5, 5.5),

@@ -1,4 +1,5 @@
-//! Benchmark with generated instances, whose optima are known from several planners and an exact oracle.
+//! Benchmark with the shipped missions, and with generated instances, whose optima are known from several planners
+//! and an exact oracle.
 //!
 //! `cargo test --release --test program reference -- --ignored --nocapture --test-threads 1` prints one line
 //! per instance. It contains name, cost, kind of proof, and processor time of the program. Then it contains

@@ -122,8 +122,8 @@ fn least_energy(mission: &Coadaptation) -> BTreeMap<usize, f64> {
 }
 
 /// For 337 of 3,080 pairs of places, joint optimisation uses less energy than the best configurations on the
-/// fixed shortest route. The pairs are places with measured ways; routes can use all ways of the map,
-/// including dark ones.
+/// fixed shortest route. The places of the pairs have measured ways; routes can use all ways of the
+/// map, including dark ones.
 #[test]
 fn joint_optimisation_beats_fixed_shortest_routes() {
     let Some(path) = data("real/map/map-p2cp3.json") else { return };

@@ -35,7 +35,7 @@ fn error_codes_are_explained() {
 }
 
 #[test]
-fn shells_complete_every_command() {
+fn shells_complete_commands_and_options() {
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let outcome = metaplan(&["completions", shell]);
         assert_eq!((outcome.status, outcome.stderr.as_str()), (0, ""), "{shell}");

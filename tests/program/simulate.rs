@@ -192,7 +192,7 @@ fn clock_of_the_loop_is_in_seconds() {
                 replanning_time.get_or_insert(now);
             }
         }
-        // Reports are sent once per time unit of the domain, and at the ends of actions.
+        // Reports are sent at each step, here one time unit of the domain, and at the ends of actions.
         let (failure_time, recovery_time) =
             (failure_time.expect("it fails"), recovery_time.expect("it is back"));
         assert!(
@@ -341,7 +341,7 @@ fn repeated_strategies_and_large_seeds_are_simulated_once() {
     assert!(outcome.stdout.contains(" of 2 "), "{outcome:#?}");
 }
 
-/// Simulates the vehicle whose designs all fail at once, with further events.
+/// Simulates the ground vehicle in a scenario with these settings and events. Returns the run.
 fn simulate_stalled(settings: &str) -> Value {
     let directory = tempfile::tempdir().expect("a directory");
     let path = |name: &str| root().join(name).display().to_string();

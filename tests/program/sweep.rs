@@ -67,7 +67,7 @@ fn killed_shards_give_the_same_table() {
         let outcome = sweep(STUDY, &shards, &["--shard", shard, "--resume"]);
         assert_eq!((outcome.status, &outcome.json()["done"]), (0, &4.into()), "{outcome:#?}");
     }
-    // A process that is killed at once leaves a file without a complete header.
+    // A process that is killed at once can leave a file without a complete header.
     for (name, text) in
         [("empty", ""), ("short", "{\"for"), ("long", "{\"format\":\"metaplan-sweep/1\",\"stu")]
     {

@@ -1,4 +1,4 @@
-//! Tests of `--trace`: the trace file contains complete spans with counts, or there is no file.
+//! Tests of `--trace`: the trace file contains complete spans with counts, or it is not written.
 
 use std::collections::BTreeMap;
 

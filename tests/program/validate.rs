@@ -1,5 +1,5 @@
-//! Tests of `metaplan validate`: the fields of the answer, the positions of messages, and plans in each
-//! format.
+//! Tests of `metaplan validate`: the fields of the answer, the positions of messages, and plans in two
+//! formats.
 
 use serde_json::{Value, json};
 
@@ -81,7 +81,7 @@ fn messages_have_a_position_and_a_suggestion() {
 }
 
 #[test]
-fn plans_are_valid_in_each_format() {
+fn plans_are_valid_as_ipc_and_as_json() {
     for mission in ["ugv", "ugv_plain", "uuv", "uuv_plain"] {
         let file = format!("missions/{mission}.toml");
         let cost = metaplan(&["plan", &file, "--format", "json"]).json()["cost"].to_string();

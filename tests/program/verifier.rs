@@ -1,5 +1,5 @@
-//! Tests that `metaplan verify` and `metaplan-verify` agree. All tests of certificates run both programs, see
-//! [`verify_in`].
+//! Tests that `metaplan verify` and `metaplan-verify` agree. Most other tests of certificates also run both programs,
+//! see [`verify_in`].
 
 use std::path::Path;
 
