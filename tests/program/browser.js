@@ -27,7 +27,8 @@ const inspect = frame => {
     return [(box.left + box.right) / 2, (box.top + box.bottom) / 2];
   };
   const distance = ([a, b], [c, d]) => Math.hypot(a - c, b - d);
-  // Exactly one drawing of each picture is visible and not clipped. The number of a step in a map is next to the arrow of that step.
+  // Exactly one drawing of each picture is visible and, unless it is marked as long, not clipped.
+  // The number of a step in a map is next to the arrow of that step.
   const drawings = state => {
     for (const pane of page.querySelectorAll(".drawn")) {
       if (!shown(pane)) continue;
