@@ -96,7 +96,7 @@ fn expedition(seed: u64) -> (String, String) {
 }
 
 #[test]
-fn tasks_in_which_more_can_help_and_hurt_have_certificates() {
+fn certificates_hold_for_tasks_in_which_more_can_help_and_hurt() {
     let mut proved = 0;
     for seed in 0..60 {
         let (domain, problem) = expedition(seed);

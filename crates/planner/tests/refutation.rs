@@ -125,7 +125,7 @@ fn only_true_claims_have_a_refutation() {
 
 #[test]
 #[ignore = "minutes"]
-fn only_true_claims_of_many_have_a_refutation() {
+fn only_true_claims_of_many_missions_have_a_refutation() {
     (1_000..3_000).for_each(|seed| check(seed, StepBound::Spent));
 }
 
