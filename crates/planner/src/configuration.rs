@@ -11,8 +11,8 @@
 //! other one must also be preferred. A partial assignment is also pruned if a budget does not even suffice for the
 //! minimum consumption of the remaining functions. So is one with an upper bound on its completions that is less than
 //! the best known worth. This upper bound is a Lagrangian relaxation of the budgets, which is valid for any
-//! multipliers \[1\]. A subgradient method computes good multipliers in floating-point arithmetic \[2\]. The
-//! multipliers are then rounded, and the bound is evaluated exactly.
+//! non-negative multipliers \[1\]. A subgradient method computes good multipliers in floating-point arithmetic
+//! \[2\]. The multipliers are then rounded, and the bound is evaluated exactly.
 //!
 //! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of
 //!   Resources, Operations Research 11(3), 1963.

@@ -1,5 +1,5 @@
-//! Certificates of random missions: true claims must be accepted; false claims and changed certificates must
-//! be rejected.
+//! Certificates of random tasks: true claims must be accepted, and false claims must be rejected, also with changed
+//! certificates.
 
 use std::fmt::Write as _;
 
@@ -60,7 +60,7 @@ fn check(seed: u64) {
 }
 
 #[test]
-fn the_truth_is_accepted_and_nothing_else() {
+fn true_claims_are_accepted_and_false_claims_rejected() {
     (0..150).for_each(check);
 }
 
@@ -96,7 +96,7 @@ fn expedition(seed: u64) -> (String, String) {
 }
 
 #[test]
-fn tasks_in_which_more_can_help_and_hurt_have_certificates() {
+fn certificates_hold_for_tasks_in_which_more_can_help_and_hurt() {
     let mut proved = 0;
     for seed in 0..60 {
         let (domain, problem) = expedition(seed);
@@ -267,7 +267,7 @@ fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>)
 /// -m venv z3; z3/bin/pip install z3-solver`, then `METAPLAN_SMT=z3/bin/z3`).
 #[test]
 #[ignore = "needs an SMT solver"]
-fn an_smt_solver_accepts_the_truth_and_nothing_else() {
+fn an_smt_solver_accepts_true_claims_and_rejects_false_claims() {
     let Ok(solver) = std::env::var("METAPLAN_SMT") else { panic!("METAPLAN_SMT names no solver") };
     for seed in 0..100 {
         let (certificate, cost) = certified(seed);

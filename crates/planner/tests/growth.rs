@@ -62,7 +62,7 @@ fn a_plan_whose_cost_does_not_fit_is_not_called_cheapest_nor_impossible() {
 }
 
 #[test]
-fn rewards_whose_sum_does_not_fit_are_not_counted() {
+fn rewards_whose_sum_does_not_fit_lead_to_no_claim() {
     let reward = format!("(decrease (total-cost) {LARGE})");
     let solution = solve(&corridor(MANY, &reward, "(:metric minimize (total-cost))"));
     assert_eq!((solution.status, solution.proof), (Status::Unknown, None));
@@ -82,7 +82,7 @@ fn the_metric_of_a_situation_is_exact_however_large_it_is() {
 }
 
 #[test]
-fn shares_of_costs_are_ordered_however_large_their_sum_is() {
+fn a_sum_of_operator_costs_may_exceed_128_bits() {
     // Two robots, each with many routes of equal cost to its goal.
     let domain = "(define (domain d) (:requirements :typing :action-costs) (:types place robot)
         (:predicates (at ?r - robot ?p - place) (next ?p ?q - place)) (:functions (total-cost) (cost ?p - place))

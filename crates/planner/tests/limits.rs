@@ -87,7 +87,7 @@ fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (
 fn wherever_time_is_up_there_is_no_false_answer() {
     let (domain, problem) = depot(4, 2, 3);
     for engine in [Engine::Auto, Engine::Sat] {
-        // The time limit increases by a fifth each time, from before the end of grounding to after the proof.
+        // The time limit increases by a fifth each time, from before the end of grounding until the proof or to 3 s.
         let mut microseconds = 100.0_f64;
         while microseconds < 3e6 {
             let limit = Duration::from_secs_f64(microseconds / 1e6);

@@ -1,4 +1,5 @@
-//! Multiple objectives and tie-breaking, compared with an enumeration of all plans of small missions.
+//! Multiple objectives and tie-breaking, compared with an enumeration of the plans of small missions that visit no
+//! waypoint twice.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -186,7 +187,7 @@ fn ties_are_broken_in_order_and_names_play_no_part() {
         let mission = Mission::random(seed);
         let ways = mission.ways();
         let key = |way: &Way| (way.time, way.stations.len(), changes(&way.designs));
-        // Operators are ordered by their arguments, i.e. by waypoints; designs are compared afterwards.
+        // Steps are compared one by one: first their operators, i.e. their waypoints, and then their designs.
         let order = |way: &Way| {
             let steps = way.stations.windows(2).zip(&way.designs);
             steps.map(|(stations, designs)| (stations.to_vec(), *designs)).collect::<Vec<_>>()

@@ -7,7 +7,8 @@ use testing::missions::Mission;
 use crate::tally::limits;
 use pddl::{Source, read};
 
-/// The SAT solver alone cannot decide missions without a plan, or missions with cycles that cost nothing.
+/// The SAT solver alone cannot decide missions without a plan, or missions with cycles that cost nothing, so it gets a
+/// horizon for these.
 fn check(seed: u64, (engine, head_start): (Engine, usize), backend: &Backend, strategy: Strategy) {
     let mission = Mission::random(seed);
     let (domain, problem) = (mission.domain(), mission.problem());

@@ -1,5 +1,6 @@
 //! Formulas of generated missions and their refutations: a false claim has no refutation, and a true claim has
-//! one, unless it would need too many steps. Changes of the files are detected.
+//! one, unless it would need too many steps or the cost is not positive. Changed formulas and
+//! legends and wrong proofs are rejected.
 
 #[allow(dead_code, reason = "another suite uses the rest")]
 use std::cell::RefCell;
@@ -115,7 +116,7 @@ fn check(seed: u64, by: StepBound) {
 }
 
 #[test]
-fn only_unsatisfiable_claims_have_a_refutation() {
+fn only_true_claims_have_a_refutation() {
     for seed in 0..60 {
         check(seed, StepBound::Spent);
         check(seed, StepBound::Potential);
@@ -124,7 +125,7 @@ fn only_unsatisfiable_claims_have_a_refutation() {
 
 #[test]
 #[ignore = "minutes"]
-fn there_are_refutations_of_many_false_claims_only() {
+fn only_true_claims_of_many_missions_have_a_refutation() {
     (1_000..3_000).for_each(|seed| check(seed, StepBound::Spent));
 }
 

@@ -72,7 +72,7 @@ fn cycles_that_cost_nothing_do_no_harm() {
 }
 
 #[test]
-fn a_metric_without_a_best_value_is_read_with_bounds() {
+fn metrics_that_may_be_unbounded_are_reported() {
     let metric = "(:metric maximize (reward))";
     check("burning", WAYS, "(at c)", metric, (Status::Feasible, Some("0"), Some(2)));
     let problem = format!(

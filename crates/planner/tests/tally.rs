@@ -1,4 +1,5 @@
-//! Statistics of random tasks that are compared with an oracle: tasks with a proof, and all tasks.
+//! Statistics of random tasks that are compared with an oracle (how many are proved optimal or unsolvable), and
+//! helpers for solving them.
 
 use std::time::Duration;
 

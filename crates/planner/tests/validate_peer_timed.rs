@@ -71,7 +71,7 @@ fn text(plan: &[Timed]) -> String {
     plan.iter().map(line).collect()
 }
 
-/// A cheapest plan with small gaps between its steps; empty if the planner finds none.
+/// A plan with small gaps between its steps, cheapest unless time runs out; empty if the planner finds none.
 fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
     let steps: Vec<(Vec<String>, Exact)> = ground(domain, problem, &GroundConfig::default())
         .ok()
@@ -107,7 +107,7 @@ fn changed(plan: &[Timed], objects: &[String], number: usize) -> Vec<Timed> {
             plan.push((start + duration.unwrap_or_default() + 5, words, duration));
         }
         2 => plan.truncate(place),
-        // The step starts earlier, so that it overlaps with or precedes an action that it needs. Sometimes it
+        // The step may start earlier, so that it overlaps with or precedes an action that it needs. Sometimes it
         // starts together with the previous step.
         3 => {
             plan[place].0 = if place > 0 && some == 0 { plan[place - 1].0 } else { plan[place].0 * some / 4 }

@@ -1,6 +1,6 @@
 //! Actions that must not be lost: a missing case, design or value may remove only the actions that need it.
 //!
-//! The planner once answered each of these tasks with a false "no plan exists" or a false optimum. The
+//! The planner once answered tasks like these with a false "no plan exists" or a false optimum. The
 //! correct result follows from the semantics in `validate`, which also executes the expected plan.
 
 use metaplan_planner::{Config, GroundConfig, Status, ground, optimize};

@@ -9,7 +9,7 @@ use task::thresholds::Thresholds;
 use testing::missions::Mission;
 use testing::{depot, fleet, ground_text, optimum};
 
-/// Number of work units of a turn. A turn ends in the middle of a search.
+/// Number of work units of a turn. A turn may end in the middle of a search.
 const TURN: u64 = 20_000;
 const TURNS: usize = 2_000;
 

@@ -1,4 +1,4 @@
-//! The ground task and the planning limits, which all stages after grounding share.
+//! The ground task and the planning limits, which stages after grounding share.
 
 use crate::limits::Limits;
 use crate::number::Int;

@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_items_are_watched_one_by_one() {
+    fn slow_items_are_watched_at_least_at_every_second_item() {
         // An interrupt instead of a deadline: a busy machine may stop the test for any time.
         let limits = Limits::none();
         let slow = |item: i32| {

@@ -16,8 +16,8 @@ pub struct Thresholds {
     /// Number of work units after which, of two alternating A\* searches, a search whose lower bound lags behind gets
     /// only half of its share.
     pub behind: u64,
-    /// Number of work units of each of two alternating A\* searches after which abstractions are computed for online
-    /// cost partitioning.
+    /// Number of work units of each alternating A\* search after which abstractions are computed for online cost
+    /// partitioning.
     pub partitioning: u64,
     /// Number of states after which stubborn sets are disabled if they have pruned too little.
     pub stubborn: u64,

@@ -90,8 +90,8 @@ impl<'a> Run<'a> {
         self.statistics.contradiction = Some(what.to_owned());
     }
 
-    /// Adds the cost of the best plan and the lower bound to the history if the change is large enough (see
-    /// [`REPORT_STEP`]).
+    /// Adds the cost of the best plan and the lower bound to the history if the cost has changed, or if the bound has
+    /// risen enough (see [`REPORT_STEP`]) or to the cost.
     pub(super) fn note(&mut self, cost: Option<Int>, lower: Int) {
         let is_news = self.noted.is_none_or(|(previous, bound)| {
             let rise = lower.saturating_sub(bound);

@@ -124,7 +124,7 @@ fn check_reasons(seeds: std::ops::Range<u64>) {
 }
 
 #[test]
-fn the_reported_proof_is_the_one_that_was_found() {
+fn the_proof_is_a_bound_exactly_if_the_initial_bound_is_the_optimum() {
     check_reasons(0..12);
 }
 

@@ -1,4 +1,4 @@
-//! Compares the library with an independent interpreter on random lifted tasks with all language constructs:
+//! Compares the library with an independent interpreter on random lifted tasks with most language constructs:
 //! printing and reading, the validator, and the ground task.
 
 mod generate;

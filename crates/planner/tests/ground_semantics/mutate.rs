@@ -37,7 +37,7 @@ fn walk(draw: &mut Draw<'_>, task: &Task) -> (Vec<Step>, State) {
     for _ in 0..=draw.below(4) {
         let executable = steps.iter().filter_map(|step| Some((step, state.after(task, step)?)));
         let mut executable: Vec<_> = executable.collect();
-        // Most instances have no effect. A plan of such instances would stay valid after any change.
+        // Most instances have no effect. A plan of such instances would stay valid after most changes.
         if executable.iter().any(|(_, after)| after.facts != state.facts) {
             executable.retain(|(_, after)| after.facts != state.facts);
         }

@@ -19,8 +19,8 @@ use serde_json::{Value, json};
 use search::{Best, optimum};
 use tasks::{Example, TASKS};
 
-/// Approximate number of changed tasks that are tested for each task, in addition to all that omit an
-/// operator or change a cost.
+/// Maximum number of changed tasks that are tested for each task, in addition to all that omit an operator or
+/// change a cost.
 const MUTANTS: usize = 300;
 
 fn files(example: &Example) -> (Domain, Problem) {
@@ -328,8 +328,8 @@ fn omitted_instances_are_detected() {
     }
 }
 
-/// The files have no changes of static atoms. So an effect on such a value of a variable would count as no effect, and
-/// a condition on it as the constant truth value of the atom.
+/// No action of the files changes a static atom. If the atom could be a value of a variable, the comparison would
+/// therefore ignore effects on it, and take a condition on it for constant.
 #[test]
 fn static_atoms_are_not_values_of_variables() {
     let example = Example {
@@ -393,7 +393,7 @@ fn unsupported_constructs_are_named() {
     assert_eq!(found, Err(Faithful::Undecided(Cause::Unsupported { construct })));
 }
 
-/// The checker must neither panic nor confuse numbers for any numbers in a certificate.
+/// Extreme numbers in a certificate must neither cause a panic nor prove a false claim.
 #[test]
 fn hostile_numbers_prove_nothing() {
     let hostile = [i128::MAX, i128::MIN, 1 << 107, -(1 << 107), 1 << 63];

@@ -1,4 +1,4 @@
-//! Computes the optimal cost of a written task by uniform-cost search over its states.
+//! Computes the optimal cost of a written task by uniform-cost search over its states. Negative costs count as 0.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -80,7 +80,8 @@ impl Task<'_> {
         Some(Best::NoPlan)
     }
 
-    /// Each slot of an operator has the index of its design and the number of its designs.
+    /// Returns the admitted choices of designs for an operator: for each slot, the index of its design and the number
+    /// of its designs.
     fn choices(&self, operator: &Value) -> Option<Vec<BTreeMap<usize, (i64, i64)>>> {
         let mut all = vec![BTreeMap::new()];
         for (slot, uses) in list(self.0["uses"].get(index(&operator["uses"])?)?).iter().enumerate() {

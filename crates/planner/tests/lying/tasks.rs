@@ -20,7 +20,7 @@ pub const TASKS: &[Example] = &[
           (:goal (at c)) (:metric minimize (total-cost)))",
         optimum: Some("4"),
     },
-    // The route with cost 4 consumes 6 of the battery, so the battery must first be filled at a cost of 3.
+    // The route with cost 4 consumes 6 of the battery, so the battery must be filled at a cost of 3.
     Example {
         name: "battery",
         domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b)) (:functions (battery) (use ?a ?b) (total-cost))
@@ -196,7 +196,7 @@ pub const TASKS: &[Example] = &[
         problem: "(define (problem p) (:domain d) (:init (p) (at 5 (not (p))) (at 12 (q))) (:goal (done)))",
         optimum: Some("10"),
     },
-    // The action must start less than 1/1000 after 3, and the next action must end before 6.
+    // The action must start less than 1/1000 after 3, and the next action must end by 6.
     Example {
         name: "moment",
         domain: "(define (domain d) (:predicates (p) (q) (r) (done))

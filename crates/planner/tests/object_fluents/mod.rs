@@ -1,5 +1,5 @@
-//! Functions whose values are objects (object fluents): random tasks are compared with a search through all
-//! states that uses the definition of such functions. Planner and validator process the compiled task and
+//! Functions whose values are objects (object fluents): random tasks are compared with a search, up to a maximum
+//! cost, that uses the definition of such functions. Planner and validator process the compiled task and
 //! must agree with this search.
 
 mod generate;
@@ -15,7 +15,7 @@ use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, print_domain, print_problem, read};
 use test_resources::data;
 
-/// Compiles a task. Printing and reading it must yield equal trees.
+/// Compiles a task. Printing it, and reading and printing it again, must yield the same texts.
 fn compiled(domain: &str, problem: &str) -> (pddl::ast::Domain, pddl::ast::Problem) {
     let read_both = |domain: &str, problem: &str| {
         let (tree, task, found) = read(&Source::new("domain", domain), &Source::new("problem", problem))
@@ -99,8 +99,8 @@ fn the_public_file_is_planned() {
     let Some(directory) = data(directory) else { return };
     let text = |name: &str| std::fs::read_to_string(directory.join(name)).expect("a file");
     let (domain, problem) = (text("domain.pddl"), text("problem.pddl"));
-    // No action assigns a place to a package.
     let solved = |problem: &str| solve(&domain, problem, true).expect("it is ground");
+    // No action assigns a place to a package.
     assert_eq!(solved(&problem).status, Status::Unsolvable);
     let goal = "(= (package_at pkg1) loc3)";
     assert!(problem.contains(goal));

@@ -3,7 +3,7 @@
 //!
 //! The abstraction starts with a single state. In each round, a cheapest abstract plan is executed in the task.
 //! The first flaw is a violated precondition, a state outside the abstract state of the plan, or a missed goal.
-//! The abstract state before the flaw is split so that the same flaw cannot recur. A binary tree records the
+//! The abstract state before the flaw is split to remove the flaw. A binary tree records the
 //! splits, and maps states to abstract states.
 //!
 //! Numeric conditions, clauses, and facts of derived variables are ignored. If an abstract state does not

@@ -9,7 +9,7 @@ use task::task::{Fact, VariableId};
 
 use crate::bounds::delete_relaxation::{DeleteRelaxation, GOAL};
 
-/// Upper limit on the number of rule visits of all reachability analyses together.
+/// Number of rule visits of all reachability analyses together after which no further analysis starts.
 const MAX_VISITS: u64 = 30_000_000;
 
 /// A landmark that does not hold in the initial state and is no goal fact.

@@ -135,8 +135,8 @@ impl Bounds {
         Ok(Self { projections, resources: Vec::new(), partitions: Vec::new(), further: Vec::new() })
     }
 
-    /// Returns a lower bound on the cost from a state to the goal, or `None` if the goal is proved
-    /// unreachable from the state.
+    /// Returns a lower bound on the cost from a state to the goal (with negative costs of operators counted as 0), or
+    /// `None` if the goal is proved unreachable from the state.
     pub fn estimate(&self, state: &State) -> Option<Int> {
         let cost = self.cost_estimate(state)?;
         let enough = |resource: &Resource| resource.has_enough_resources(state, &self.projections);

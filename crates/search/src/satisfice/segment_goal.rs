@@ -79,7 +79,7 @@ mod tests {
     use crate::satisfice::{Satisficer, StepResult};
 
     #[test]
-    fn a_segment_goal_holds_in_states_in_which_the_suffix_is_a_plan() {
+    fn a_segment_goal_holds_only_in_states_in_which_the_suffix_is_a_plan() {
         let limits = Limits::none();
         let missions = (0..10).map(Mission::random).map(|mission| (mission.domain(), mission.problem()));
         let (mut complete, mut tested) = (0, 0);

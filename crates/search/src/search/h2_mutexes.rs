@@ -371,8 +371,8 @@ mod tests {
     use testing::random::Random;
     use testing::{depot, ground_text};
 
-    /// Returns the numbers of dead ends and of useless operators that were found. Checks that none
-    /// of them is on a path to the goal.
+    /// Returns the numbers of dead ends and of transitions by useless operators that were found. Checks
+    /// that none of them is on a path to the goal.
     fn check(text: &(String, String)) -> Option<[usize; 2]> {
         let task = ground_text(text.clone());
         let (states, steps) = reachable(&task).filter(|_| task.unreachable.is_none())?;

@@ -1,4 +1,4 @@
-//! Evaluates conditions without free variables in the initial state.
+//! Evaluates conditions in the initial state, and checks that their values are defined.
 
 use num_rational::BigRational;
 use num_traits::Zero;

@@ -1,8 +1,8 @@
 //! Compiles preferences and trajectory constraints of PDDL 3 to PDDL 2. Works on the syntax tree before names
 //! are resolved.
 //!
-//! Each instance of a constraint is monitored by an automaton. Auxiliary atoms store its state, and additional
-//! effects of the actions update these atoms. A condition on the state *after* an action is regressed to the
+//! Each instance of a constraint (except `at end`) is monitored by an automaton. Auxiliary atoms store its state, and
+//! additional effects of the actions update these atoms. A condition on the state *after* an action is regressed to the
 //! state before the action (`regress`) \[1\], so the automata need no actions of their own. Hard constraints
 //! become conditions of actions and of the goal. Preferences on the goal and on trajectories are evaluated
 //! after the plan by hidden actions (`preferences`) \[2\]: each preference is satisfied or costs what the

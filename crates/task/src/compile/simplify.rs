@@ -1,4 +1,4 @@
-//! Constructors of conditions that simplify their operands.
+//! Constructors that simplify conditions, and related helpers.
 
 use pddl::ast::{Atom, Condition, Identifier, Name, Span, Term, TypedName};
 

@@ -230,7 +230,7 @@ impl<'t> Monitors<'t> {
                 let happening = Happening::of(action, time);
                 conditions.iter().any(|condition| !is_false(&happening.touches(condition)))
             };
-            // Most actions have no effect at their end.
+            // The end is checked first: instantaneous actions change nothing at it.
             if !TIMES.into_iter().rev().all(may_change) || takes_time(self.domain, self.problem, action) {
                 continue;
             }

@@ -172,7 +172,7 @@ impl Rational {
 /// Converts an index (of an operator, atom, value, design or step) to 32 bits.
 ///
 /// # Panics
-/// Panics if the index is 2^32 or greater. That many items do not fit into memory.
+/// Panics if the index is 2^32 or greater.
 pub fn dense(index: usize) -> u32 {
     u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
 }

@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn times_are_not_rounded() {
+    fn finite_decimals_are_not_rounded() {
         for (numerator, denominator, expected) in [
             (5, 1, "5.000"),
             (5, 2, "2.500"),

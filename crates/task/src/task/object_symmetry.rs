@@ -22,8 +22,8 @@ const WORK_LIMIT: usize = 2_000_000;
 
 /// Returns exchanges of consecutive objects in each class of interchangeable objects; for the class {a, b, c} these are
 /// the exchanges of a and b, and of b and c. Every exchange preserves the operators and the goal; if `initially` is
-/// `true`, it also preserves the initial state. Some symmetries may be missing, because the number of comparisons is
-/// limited. Tasks with derived variables yield an empty list.
+/// `true`, it also preserves the initial state. Some symmetries may be missing, for example because the number of
+/// comparisons is limited. Tasks with derived variables yield an empty list.
 ///
 /// # Errors
 /// The deadline has passed or the run is interrupted.

@@ -122,7 +122,8 @@ impl Definitions {
 }
 
 /// Distributes a condition without comparisons to CNF clauses, without tautologies. Returns `None` if there
-/// is a comparison or a disjunction has more than `CLAUSE_LIMIT` clauses.
+/// is a comparison, or if distributing a disjunction gives more than `CLAUSE_LIMIT` clauses (before tautologies are
+/// dropped).
 fn clauses(residual: &Residual) -> Option<Vec<Vec<GroundLiteral>>> {
     match residual {
         Residual::True => Some(Vec::new()),

@@ -86,7 +86,7 @@ fn table(
     for_each_combination(&mentioned, slots, binding, limits, &mut |binding, combination| {
         match ground(world, expression, binding) {
             Ok(linear) => {
-                // Functions whose arguments mention a slot are static; otherwise the parameter would not be a slot.
+                // Terms that mention a slot are static; otherwise the parameter would not be a slot.
                 assert!(linear.coefficients.is_empty(), "invariant: a table has no fluents");
                 values.push(linear.quantity.constant);
             }

@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_without_a_common_scale_are_rejected() {
+    fn sums_of_tables_beyond_the_limit_are_rejected() {
         let number = LIMIT - 1;
         for (tables, number, fits) in [
             (1, number, true),

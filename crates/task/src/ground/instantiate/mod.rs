@@ -6,7 +6,7 @@
 //! make the instance impossible. Numeric conditions and effects of the end are rewritten over the state
 //! before the start.
 //!
-//! Conditional effects on atoms are kept. An instance with conditional numeric effects (including costs) or
+//! Conditional end effects on atoms are kept. An instance with conditional numeric effects (including costs) or
 //! conditional start effects is split into one operator for each combination of truth values.
 //!
 //! `slot_split` separates the parts of a schema that mention slots. `frame` caches data of instances with

@@ -116,8 +116,8 @@ impl Timeline {
         })
     }
 
-    /// Computes the length of the moment (a very short time after an event) from all durations, and
-    /// substitutes it for the placeholder variable. Operators that become impossible are removed.
+    /// Computes the length of the moment (a very short time after an event) from all durations and times of events,
+    /// and substitutes it for the placeholder variable. Operators that become impossible are removed.
     pub(super) fn settle(&self, operators: &mut Vec<GroundOperator>) {
         let durations = operators.iter().flat_map(|operator| {
             let tables = operator.duration.tables.iter().flat_map(|table| table.values.iter());

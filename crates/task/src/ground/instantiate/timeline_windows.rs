@@ -212,7 +212,7 @@ impl<'t> TimelineWindow<'t> {
     }
 
     /// Returns the clock variable and its value after the action, or `None` if the clock does not change. The
-    /// clock stops at the last event, which keeps the state space finite.
+    /// clock stops at the last event, so that it has finitely many values.
     pub(super) fn clock(&self) -> Option<(NumericId, Linear<Rational>)> {
         let Timeline { clock, events, .. } = self.timeline;
         if self.from == events.len() {

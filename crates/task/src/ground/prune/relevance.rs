@@ -23,7 +23,6 @@ pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     read.extend(
         task.objectives.iter().flat_map(|objective| objective.rest.iter().map(|(variable, _)| *variable)),
     );
-    // A variable is also read if the new value of a read variable depends on it.
     let mut open: Vec<NumericId> = read.iter().copied().collect();
     while let Some(variable) = open.pop() {
         let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(variable));
