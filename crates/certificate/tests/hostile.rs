@@ -1,5 +1,5 @@
-//! Adversarial documents are checked in polynomial time, or rejected early with a message that
-//! names the exceeded size. The tests run unoptimised, in threads with a stack of 2 MB.
+//! Adversarial documents. Large ones are checked, or rejected with a message that names the
+//! exceeded size; wrong ones are rejected. The stack of a test has 2 MB.
 
 use std::fmt::Write as _;
 
