@@ -21,7 +21,7 @@ const STEPS: usize = 6;
 
 const MOST_STEPS: usize = 16;
 
-/// Cost limit above all costs. Used if no plan with the number of steps exists, so that the limit is not the reason.
+/// Cost limit above all costs. Used if no plan is known, so that the limit is not the reason.
 const MUCH: Int = 200;
 
 /// Returns `true` if the formula admits a plan with at most `steps` steps and a cost of at most

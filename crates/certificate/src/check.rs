@@ -41,7 +41,7 @@ pub struct Checked {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// A document (task or argument) is malformed.
+    /// A document (task or argument) is malformed, or the task exceeds a limit of the checker.
     #[error("{document}: {reason}")]
     Form {
         /// Name of the document.

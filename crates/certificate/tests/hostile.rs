@@ -1,5 +1,5 @@
-//! Adversarial documents are checked in polynomial time, or rejected early with a message that
-//! names the exceeded size. The tests run unoptimised, in threads with a stack of 2 MB.
+//! Adversarial documents. Large ones are checked, or rejected with a message that names the
+//! exceeded size; wrong ones are rejected. The stack of a test has 2 MB.
 
 use std::fmt::Write as _;
 
@@ -125,7 +125,7 @@ fn long_lists_of_names_are_rejected_or_compared() {
 }
 
 #[test]
-fn long_chains_of_derived_predicates_are_compared_quickly() {
+fn long_chains_of_derived_predicates_are_compared() {
     let count = 3_000;
     let mut declarations = String::new();
     let mut more = String::new();
@@ -139,7 +139,7 @@ fn long_chains_of_derived_predicates_are_compared_quickly() {
 }
 
 /// The combinations of designs do not dominate each other: of two combinations, one costs less, and
-/// the other satisfies more conditions.
+/// the other has a greater sum in the condition.
 #[test]
 fn many_non_dominated_design_combinations_are_rejected() {
     let slots = 19;

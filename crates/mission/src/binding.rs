@@ -408,7 +408,7 @@ pub(super) fn fill(
     fill.warnings
 }
 
-/// Returns the individuals that [`fill`] uses as objects of a problem.
+/// Returns the individuals that [`fill`] may use as objects of a problem.
 pub(super) fn individuals(
     domain: &Domain,
     knowledge: &Knowledge,

@@ -223,8 +223,7 @@ impl Mission {
         self.fill(&mut problem);
         let diagnostics = pddl::check(&self.domain, &self.domain_source, &problem, &source);
         let errors = diagnostics.into_iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
-        // Only the goal is part of this text. Diagnostics about the domain were reported when the
-        // mission was read.
+        // Only the goal is part of this text. `filled` reports the diagnostics about the domain.
         let errors: Vec<_> = errors.filter(|diagnostic| diagnostic.file == "goal").collect();
         if errors.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&errors, &[&source]).into()) }
     }

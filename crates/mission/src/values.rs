@@ -10,7 +10,7 @@ use ontology::tomasys::{Estimation, Individual, Measurement};
 use crate::knowledge::{Knowledge, doubt_about};
 use crate::message::Message;
 
-/// Returns an error for each pair of different values of one of the attributes that the problem uses.
+/// Returns an error for each value that differs from the first one, for the attributes that the problem uses.
 pub(crate) fn several_values(knowledge: &Knowledge, attributes: &BTreeSet<String>) -> Vec<Message> {
     let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
     let mut errors = Vec::new();

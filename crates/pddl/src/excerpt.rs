@@ -19,7 +19,8 @@ pub struct Excerpt {
     message: String,
 }
 
-/// Maximum number of bytes that an excerpt contains on each side of the beginning of the marked range.
+/// Maximum number of bytes that an excerpt contains on each side of the beginning of the marked range,
+/// before it is rounded to character boundaries.
 const CONTEXT: usize = 150;
 
 #[expect(

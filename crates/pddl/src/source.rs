@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn latin_1_is_read() {
+    fn invalid_utf_8_becomes_replacement_characters() {
         assert_eq!(Source::from_bytes("f", b"; caf\xe9").text(), "; caf\u{fffd}");
     }
 

@@ -1,4 +1,4 @@
-//! Tests of every construct of the language. A construct is accepted and printed as written, rejected as
+//! Tests of the constructs of the language. A construct is accepted and printed as written, rejected as
 //! unsupported by its name, or reported with an error code.
 
 use metaplan_pddl::{
@@ -177,7 +177,7 @@ const ACCEPTED: [(&str, &str); 94] = [
 ];
 
 #[test]
-fn every_construct_is_read_and_printed_as_written() {
+fn accepted_constructs_are_read_and_printed_as_written() {
     for (place, what) in ACCEPTED {
         assert_eq!(errors(place, what), [""; 0], "{place}: {what}");
         let (domain, problem) = texts(place, what);

@@ -38,7 +38,7 @@ fn accepted(domain: &Source, problem: &Source) -> Vec<&'static str> {
 }
 
 #[test]
-fn a_domain_with_all_quirks_is_accepted() {
+fn a_domain_with_many_quirks_is_accepted() {
     let domain = Source::new(
         "domain",
         "( DEFINE ( domain Q )\r\n(:requirements :Typing :typing :durative-actions)\r\n(:types room zone - place action)

@@ -40,7 +40,7 @@ pub(crate) fn read(directory: &Path) -> Result<(Manifest, Contents), String> {
     if matches!(manifest.claim, Claim::Front(_)) {
         return Err(format!("{MANIFEST}: the certificate of a single plan cannot claim a front"));
     }
-    // These texts are printed. With a line break, they could imitate the result of a check.
+    // These texts are printed. Where line breaks are not escaped, they could imitate the result of a check.
     let printed = match (&manifest.claim, &manifest.refutation) {
         (Claim::Optimal { metric }, _) if metric.contains(char::is_control) => Some("metric"),
         (_, Refutation::None(reason)) if reason.contains(char::is_control) => Some("refutation"),

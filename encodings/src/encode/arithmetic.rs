@@ -122,7 +122,7 @@ impl Arithmetic<'_> {
     }
 
     /// Returns the product of a number and a constant as a number with `width` bits, by shifts and additions.
-    /// The product must fit into this width.
+    /// The product must fit into this width. For the factor 1, the result is at least as long as `bits`.
     pub(crate) fn multiple(&mut self, bits: &Bits, factor: Int, width: usize) -> Bits {
         if factor == 1 {
             return Self::extend(bits, width);
@@ -144,7 +144,7 @@ impl Arithmetic<'_> {
 
     /// Returns a number that depends on `premises`, which are pairs of a conjunction and a value. The number
     /// has the value whose conjunction is true, and is 0 if `active` is false. At most one conjunction may be
-    /// true at a time, and one must be true if `active` is.
+    /// true at a time, and none if `active` is false. If only `active` is true, the number is not determined.
     pub(crate) fn choose(&mut self, premises: &[(Vec<Lit>, Int)], active: Lit) -> Bits {
         let low = premises.iter().map(|(_, value)| *value).fold(0, Int::min);
         let high = premises.iter().map(|(_, value)| *value).fold(0, Int::max);

@@ -350,7 +350,7 @@ impl Sum<'_, '_> {
             let active = self.builder.variables.busy[*step as usize];
             let mut arithmetic = Arithmetic { formula: &mut self.builder.formula, family: Family::Cost };
             let increment = arithmetic.choose(&possible, active);
-            // Neither summand exceeds the gap, so the sum fits into the width. Then the sum is
+            // Neither summand has more bits than the gap, so the sum fits into the width. Then the sum is
             // bounded by the gap again.
             spent = arithmetic.add(&spent, &increment, width);
             arithmetic.at_most(&spent, gap);

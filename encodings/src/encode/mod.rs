@@ -1,4 +1,4 @@
-//! Encoding of ground tasks: the formula is satisfiable if there is a plan of at most `horizon` steps with a
+//! Encoding of ground tasks: the formula is satisfiable if there is a plan of at most `horizon` allowed steps with a
 //! cost of at most `limit`. In sequential semantics and with summed costs, there is such a plan if the formula
 //! is satisfiable; in parallel semantics, the plan may have several operators per step.
 //!

@@ -2,8 +2,8 @@
 //!
 //! Each solver has its own file, and no other file names the solver's crate. Solvers are incremental: they
 //! accept further clauses after each answer, solve under assumptions, and report a core, i.e. assumptions
-//! that together are inconsistent with the clauses. Built-in solvers keep learnt clauses; an external program
-//! starts from the beginning in each call.
+//! that together are inconsistent with the clauses. Built-in solvers usually keep learnt clauses; an external
+//! program starts from the beginning in each call.
 
 mod batsat;
 #[cfg(feature = "cadical")]

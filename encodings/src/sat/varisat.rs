@@ -2,7 +2,7 @@
 //!
 //! Varisat has no function for interrupting it. But it streams its proof, and stops if writing the
 //! proof fails. The proof therefore goes to a sink that counts learnt clauses and fails at a limit. The
-//! sink requests Varisat's own proof format, because DRAT supports neither assumptions nor clauses
+//! proof has Varisat's own format, because DRAT supports neither assumptions nor clauses
 //! that are added later.
 //!
 //! Answers under assumptions are correct. But after the first call that is unsatisfiable because of its

@@ -25,7 +25,7 @@ impl Formula {
     }
 
     /// Encodes the sum of two numbers of equal width by a ripple-carry adder, and returns its bits.
-    /// The sum must not overflow.
+    /// A sum that overflows wraps around.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in a number whose bits are held in memory")]
     pub(super) fn add(&mut self, left: &Bits, right: &Bits, name: &str) -> Bits {
         let sum = self.bits(left.len(), name);

@@ -2,8 +2,9 @@
 //!
 //! All numbers are in two's complement. To the cost and to each number, an operator adds a constant and one
 //! entry of each of its tables; the designs chosen at the step select the entries. An assignment adds these
-//! summands to 0 instead of the previous value. No sum overflows: the accumulated cost is limited after each
-//! step, and each number is wide enough for its range after all steps of the formula.
+//! summands to 0 instead of the previous value. No result overflows (a partial sum may wrap around): the
+//! accumulated cost is limited after each step, and each number is wide enough for its range after all steps of
+//! the formula.
 
 use std::collections::BTreeMap;
 

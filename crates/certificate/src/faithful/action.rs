@@ -2,7 +2,8 @@
 //! each under a condition on the state before the action.
 //!
 //! A durative action is one step: its start effects precede the evaluation of its over-all and
-//! at-end conditions and its end effects. An instantaneous action is one happening. With timed
+//! at-end conditions and its end effects. An instantaneous action is one happening, as are start
+//! and end of a durative action with duration 0. With timed
 //! events there are separate cases for each interval of time in which the action can be executed.
 
 use std::borrow::Cow;
@@ -340,7 +341,7 @@ impl Moment {
         Ok(cases)
     }
 
-    /// Returns the changes of the numeric fluents as one or more cases. `known` must decide all guards (conditions of
+    /// Returns the changes of the numeric fluents as cases. `known` must decide all guards (conditions of
     /// effects). If several values are assigned to one fluent, they must be equal; each case extends `known` by this
     /// assumption. There is no case if active effects contradict each other or are undefined.
     fn numbers(

@@ -20,7 +20,7 @@ use pddl::ast::{Atom, Condition, Derived, Name, Term, TypedName};
 /// Upper limit on the number of derived atoms, and on the number of partial bindings of one rule.
 const ATOM_LIMIT: usize = 50_000;
 
-/// Upper limit on the number of conjuncts that are used to restrict the candidate objects of variables.
+/// Upper limit on the number of conjuncts by which an [`Occurrence`] restricts the candidate objects of parameters.
 const CONJUNCT_LIMIT: usize = 64;
 
 struct Occurrence<'w> {

@@ -1,4 +1,4 @@
-//! Analyses the derived atoms. Computes which of them hold in all states or in no state of the witness (the
+//! Analyses the derived atoms. Proves of some that they hold in all states or in no state of the witness (the
 //! over-approximation of the reachable states). Also computes which derived variables of the task lie on
 //! dependency cycles or between cycles.
 

@@ -14,8 +14,8 @@ use crate::faithful::verdict::Cause;
 
 const CASE_LIMIT: usize = 4_096;
 
-/// Upper limit on the nesting depth of a condition after derived atoms are replaced by their rules.
-/// Functions on formulas recurse to this depth.
+/// Upper limit on the nesting depth of a formula that replaces a derived atom; the outermost one may exceed it.
+/// Functions on formulas recurse to the depth of the whole formula, at most a few hundred levels more.
 pub(super) const DEPTH_LIMIT: usize = 300;
 
 /// A condition in negation normal form.

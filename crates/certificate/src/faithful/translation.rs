@@ -23,8 +23,8 @@ const TOTAL_LIMIT: usize = 16 * SIZE_LIMIT;
 type Result<T> = std::result::Result<T, Obstacle>;
 
 pub(super) struct Names {
-    /// For each variable and value, the atom; `None` for the last value of a variable and for atoms
-    /// that the PDDL files do not contain.
+    /// For each variable and value, the atom; `None` for the last value of a variable, and for a derived variable
+    /// that represents no derived atom of the PDDL files.
     keys: Vec<Vec<Option<Key>>>,
     facts: FxHashMap<Key, Fact>,
     pub(super) fluents: Vec<Key>,

@@ -5,7 +5,7 @@ use thiserror::Error;
 /// Outcome of checking a ground task against its PDDL files.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Faithful {
-    /// The task is faithful: it permits every plan of the PDDL files, at no more cost.
+    /// The task is faithful: it permits every plan of the PDDL files without overlapping actions, at no more cost.
     Yes {
         /// Number of action instances that may be executable in a state of the witness.
         instances: usize,

@@ -135,7 +135,7 @@ impl Catalogue {
         if OTHER_CLASSES.contains(&property) {
             let classes = self.classes.lock().unwrap_or_else(PoisonError::into_inner).clone();
             let is_queried = classes.contains_key(property) || classes.contains_key(local_name(property));
-            // Copies of this cache have other members of the class.
+            // Copies of this cache do not share the change of the members.
             self.classes = Arc::new(Mutex::new(classes));
             return !is_queried;
         }

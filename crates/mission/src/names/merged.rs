@@ -2,7 +2,7 @@
 //! problem. PDDL has one name space and ignores case, so this happens to individuals whose names differ only in their
 //! namespaces or in case.
 //!
-//! Individuals that the problem does not use may have equal names, and so may names of one individual.
+//! Individuals that the problem does not use may have equal names, and so may different IRIs of one individual.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -33,7 +33,7 @@ pub(super) struct Role {
     pub(super) class: String,
     pub(super) types: TypeExpression,
     pub(super) individuals: Vec<Individual>,
-    /// Objects with this role, each once, in the order of the files.
+    /// Objects with this role, each once.
     pub(super) objects: Vec<Object>,
 }
 

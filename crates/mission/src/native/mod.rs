@@ -290,8 +290,8 @@ impl CoAdaptation {
         }
     }
 
-    /// Adds the value 0 for a change to a design without an estimation. Without a value, no action could change to the
-    /// design.
+    /// Adds the values for changes of designs that the bindings do not add. A change to a design without an estimation
+    /// has the value 0: without a value, no action could change to the design.
     fn fill_changes(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
         let attributes: BTreeSet<&String> = self.changed.values().collect();
         for attribute in attributes {

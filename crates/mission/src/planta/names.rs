@@ -39,8 +39,8 @@ pub(super) fn literal(lexical: &str, datatype: Option<&str>) -> Name {
 }
 
 /// Replaces by underscores: white space, control characters, parentheses, square and curly brackets, quotation marks,
-/// the characters `;?:,|\`, and non-ASCII characters that are neither letters nor digits. Other ASCII symbols, such
-/// as `.` and `#`, are kept, although standard PDDL names do not admit them.
+/// backticks, the characters `;?:,|\`, and non-ASCII characters that are neither letters nor digits. Other ASCII
+/// symbols, such as `.` and `#`, are kept, although standard PDDL names do not admit them.
 fn spelled(text: &str) -> String {
     let allowed = |letter: char| {
         letter.is_ascii_graphic() && !"()[]{};\"'?:,|`\\".contains(letter) || letter.is_alphanumeric()

@@ -24,7 +24,7 @@ impl<'a> Checker<'a> {
         let mut facts: FxHashMap<Key<'a>, (Span, bool)> = FxHashMap::default();
         let mut values: FxHashMap<Key<'a>, (Span, &BigRational)> = FxHashMap::default();
         let is_value = |element: &&InitialElement| matches!(element, InitialElement::Value(..));
-        // Exact capacities: `:init` can have millions of elements.
+        // Reserved at once, because `:init` can have millions of elements.
         let count = init.iter().filter(is_value).count();
         values.reserve(count);
         facts.reserve(init.len() - count);

@@ -70,7 +70,7 @@ pub fn validate(domain: &Domain, problem: &Problem, plan: &PlanText, options: &O
 }
 
 /// Executes a plan like [`validate`], but ends early once `stop` returns `true`. `stop` is called at the beginning,
-/// and then at least once in a few hundred steps of the loops, but not while the initial state is indexed.
+/// and then regularly in most loops, but not while the initial state is indexed.
 ///
 /// # Errors
 /// Returns [`Interrupted`] if `stop` has returned `true`.

@@ -95,9 +95,9 @@ impl<'a, T: TimeNumber> Index<'a, T> {
         }
     }
 
-    /// Returns `true` if no happening strictly inside a run of `own` makes `fact` false. `alone`
-    /// ignores starts and ends of other runs of the same action. Returns `None` if the work limit
-    /// `left` is used up.
+    /// Returns `true` if it is proved that no happening strictly inside a run of `own` makes `fact` false while
+    /// `invariant` holds. `alone` ignores starts and ends of other runs of the same action. Returns `None` if the
+    /// work limit `left` is used up.
     fn is_kept(
         &self,
         fact: Fact,

@@ -242,7 +242,7 @@ impl<'a> Builder<'a> {
     /// Durations that do not depend on the state, and divisors of those that do.
     ///
     /// # Errors
-    /// Fails if a divisor is not positive, a duration cannot be computed, or a limit is reached.
+    /// Fails if a divisor is not a positive constant, a duration cannot be computed, or a limit is reached.
     pub(super) fn static_durations(
         &mut self,
         Context { task, limits }: Context<'_>,
@@ -309,8 +309,7 @@ impl<'a> Builder<'a> {
         contradictory.collect()
     }
 
-    /// Returns `true` if some interference constraints come from effects that do not apply in every
-    /// state.
+    /// Returns `true` if some write set contains an effect whose condition depends on the state.
     pub(super) fn assumes_conflicts(&self) -> bool {
         self.footprints.supposes
     }

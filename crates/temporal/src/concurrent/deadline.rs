@@ -43,8 +43,8 @@ impl<T: TimeNumber> Deadline<T> {
         let holds = |ways: &[OperatorId], state: &State| {
             ways.iter().any(|id| task.operators[id.index()].applicable(state, &[]))
         };
-        // Time of the nearest later state in which an end condition holds; the states are visited
-        // in reverse order.
+        // Time of the nearest state, from the visited one on, in which an end condition holds; the states are
+        // visited in reverse order.
         let mut next: Option<T> = None;
         trajectory.iter().rev().all(|(time, state)| {
             if holds(&self.ends, state) {

@@ -66,7 +66,7 @@ impl Footprint {
 
 pub(super) struct Footprints<'a> {
     world: World<'a>,
-    /// `true` if some write set contains an effect that does not apply in every state.
+    /// `true` if some write set contains an effect whose condition depends on the state.
     pub(super) supposes: bool,
 }
 

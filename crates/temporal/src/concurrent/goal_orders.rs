@@ -59,7 +59,7 @@ const MAX_STALE: u64 = 200_000;
 /// perturbed.
 const NEIGHBOURS: usize = 12;
 const KICK: usize = 3;
-/// The states of an order may take at most 1/`MEMORY_FRACTION` of the memory limit.
+/// The states of the stored orders may take at most 1/`MEMORY_FRACTION` of the memory limit.
 const MEMORY_FRACTION: usize = 8;
 
 type Link = (OperatorId, bool);
@@ -268,7 +268,8 @@ impl<'a, T: TimeNumber> GoalOrders<'a, T> {
     }
 
     /// Decodes an order. `base` is a decoded order with the same goals before the given position, so decoding
-    /// begins at this position. Fails if a goal is not achieved or the value exceeds `limit`.
+    /// begins at this position. Fails if a goal is not achieved, a hard deadline is missed, or the value overflows
+    /// or exceeds `limit`.
     fn decode(
         &mut self,
         order: &[usize],

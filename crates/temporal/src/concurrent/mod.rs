@@ -161,7 +161,7 @@ fn ground_plain(files: Files<'_>, has_deadlines: bool) -> Result<ConcurrentTask,
             Ok(ConcurrentTask(Width::Narrow(free)))
         }
         (Ok(ConcurrentTask(Width::Narrow(_))), Err(_)) => Err(uncounted_preferences(files.1)),
-        // Linear programs for chosen durations support narrow numbers only.
+        // Linear programs for chosen durations support narrow numbers only, and no preferences or deadlines.
         (Ok(_), shortest) => shortest,
         (Err(_), Ok(shortest)) => Ok(shortest),
         (Err(errors), Err(_)) => Err(errors),

@@ -122,7 +122,7 @@ impl<T: TimeNumber> SimpleTemporalNetwork<T> {
     }
 
     /// Returns `true` if no action is running and the last timed initial literals took place after
-    /// all other happenings.
+    /// time 0 and after all other happenings.
     pub(super) fn waits(&self) -> bool {
         self.opens.is_empty() && self.floor > self.latest()
     }

@@ -24,8 +24,8 @@ pub(super) struct Answer {
 /// Returns the best plan of a sequence, or `None` if no times and durations reach the goal.
 ///
 /// Minimises, in this order: metric, makespan, sum of durations, sum of the times of all happenings.
-/// A metric without a minimum is skipped. Durations are decimals if possible, even if that increases
-/// the metric slightly.
+/// A metric without a minimum is skipped. Durations that are no decimals are then rounded to decimals if [`rounded`]
+/// succeeds, even if that increases the metric slightly.
 pub(super) fn answer(concurrent: &TemporalTask, course: &Course) -> Option<Answer> {
     let mut program = course.program.clone();
     if !program.constrain(&course.goal(concurrent)?) {

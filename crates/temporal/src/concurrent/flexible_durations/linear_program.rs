@@ -1,7 +1,7 @@
 //! Linear programs in exact rational arithmetic, reoptimised after each added constraint.
 //!
-//! A program is stored as a *dictionary* \[1\]: basic columns and slacks as expressions over the
-//! nonbasic columns. The dual simplex algorithm restores feasibility after adding a constraint; the
+//! A program is stored as a *dictionary* \[1\]: each basic column as an expression over the nonbasic ones. Slacks
+//! are columns, too. The dual simplex algorithm restores feasibility after adding a constraint; the
 //! primal simplex algorithm minimises another objective. Both use Bland's rule to guarantee
 //! termination \[2\].
 //!

@@ -104,7 +104,7 @@ impl Course {
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.numbers.iter().map(Affine::bytes);
         // `Affine::bytes` includes the expression itself. `size_of::<Passed>()` is added for the
-        // table of traces, which stores about this amount for each happening.
+        // table of traces, which stores less than this amount for each happening.
         let times = self.passed.iter().map(|passed| {
             let bytes = passed.time.bytes().saturating_add(passed.duration.bytes());
             bytes.saturating_add(passed.measured.bytes()).saturating_add(size_of::<Passed>())

@@ -3,9 +3,8 @@
 //! Both searches are lazy: a sequence is evaluated, and its linear program solved, when it is
 //! expanded. The greedy search is guided by relaxed plans in which a number takes the best value
 //! that the bounds of durations allow. It detects duplicates by values, running actions and ranges
-//! of numbers, and keeps the sequence with the least metric. The exhaustive search expands the
-//! sequence with the least optimum of its program first, and keeps one sequence per Mazurkiewicz
-//! trace.
+//! of numbers, and keeps the sequence with the least metric. The exhaustive search takes the sequence whose
+//! parent has the program with the least optimum first, and keeps one sequence per Mazurkiewicz trace.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -31,8 +30,9 @@ use crate::concurrent::temporal_task::TemporalTask;
 /// heuristic value.
 const BOOST: i64 = 1_000;
 
-/// Queue entry: heuristic value, lower bound on the metric, depth (deepest first), insertion order,
-/// parent node, and the happening with the index of the action's run that it ends (0 for a start).
+/// Queue entry: of the parent node, the heuristic value, the lower bound on the metric, and the depth (deepest
+/// first); insertion order; the parent node; and the happening with the index of the action's run that it ends (0
+/// for a start).
 type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u32))>;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,8 +94,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Lower bound on the metric of plans not found yet. Valid only if the search is exhaustive.
-    /// Returns `None` if no bound is known.
+    /// Lower bound on the metric of every plan, before durations are rounded. Valid only if the search is
+    /// exhaustive. Returns `None` if no bound is known.
     pub(super) fn lower(&self) -> Option<Rational> {
         let open = self.queues[0].peek().map(|Reverse((_, least, ..))| least);
         open.into_iter().chain(&self.reached).min().cloned()
