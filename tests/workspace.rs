@@ -1,5 +1,5 @@
-//! Checks that each workspace member outside of the default members, which `cargo test` in the root skips,
-//! has a test command.
+//! Checks that [`COMMANDS`] lists each workspace member outside of the default members, which `cargo test` in the root
+//! skips, with its test command.
 //!
 //! The program prints one line with these members and the commands that test them.
 

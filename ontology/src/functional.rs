@@ -1,5 +1,5 @@
-//! Formats axioms in functional-style syntax and rules in SWRL's human-readable syntax, with full IRIs: for
-//! messages, and as labels of the rules that are lowered from axioms.
+//! Formats axioms in functional-style syntax and rules in SWRL's human-readable syntax, with full IRIs except for
+//! variables: for messages, and as labels of the rules that are lowered from axioms.
 
 use std::fmt::{Display, Formatter, Result};
 

@@ -236,7 +236,7 @@ pub enum Atom {
 }
 
 /// A SWRL rule: if the body holds, so does the head. Variables range only over the individuals, named or anonymous, and
-/// the data values that occur in the knowledge base (DL-safe).
+/// the data values that occur in the knowledge base (DL-safe) or that built-ins compute.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rule {
     /// IRI of the ontology that states the rule; the document's name if the ontology has no IRI.

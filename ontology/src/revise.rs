@@ -401,8 +401,8 @@ fn with_arguments(atom: &Atom, map: &mut impl FnMut(&Argument) -> Argument) -> A
     }
 }
 
-/// Returns the axiom in a canonical form. The members of sets are sorted, and a positive or negative assertion of
-/// an inverse property becomes an assertion of the property with swapped individuals.
+/// Returns the axiom in a canonical form. The members of sets are sorted, except in data ranges. A positive or negative
+/// assertion of an inverse property becomes an assertion of the property with swapped individuals.
 fn canonical(axiom: &Axiom) -> Axiom {
     fn ordered<T: Ord + Clone>(items: &[T]) -> Vec<T> {
         items.iter().cloned().collect::<BTreeSet<T>>().into_iter().collect()

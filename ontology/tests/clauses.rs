@@ -137,7 +137,7 @@ fn consequences_are_derived() {
 }
 
 #[test]
-fn documents_are_read_in_any_encoding_and_spelling() {
+fn documents_in_several_encodings_and_spellings_are_read() {
     let xml = |encoding: &str| {
         format!(
             "<?xml version=\"1.0\" encoding=\"{encoding}\"?><rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\" \

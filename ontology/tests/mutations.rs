@@ -115,7 +115,7 @@ fn run(mut numbers: Numbers, enough: impl Fn(usize) -> bool) -> (usize, usize) {
 }
 
 #[test]
-fn damaged_documents_never_panic() {
+fn damaged_documents_do_not_panic() {
     let (cases, accepted) = run(Numbers(0x9E37_79B9_7F4A_7C15), |cases| cases == 60);
     assert!(accepted > cases / 20, "{accepted} of {cases} were still knowledge bases");
 }
@@ -124,7 +124,7 @@ fn damaged_documents_never_panic() {
 /// mutations:: -- --ignored --nocapture`
 #[test]
 #[ignore = "the number of cases is METAPLAN_CASES"]
-fn many_damaged_documents_never_panic() {
+fn many_damaged_documents_do_not_panic() {
     let number = |name: &str, default: u64| {
         std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
     };

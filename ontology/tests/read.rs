@@ -500,7 +500,7 @@ fn our_tomasys_is_found_without_any_file() {
 
 /// IRIs contain some characters of paths only in percent-encoded form.
 #[test]
-fn imports_in_directories_with_any_name_are_found() {
+fn imports_in_directories_with_special_characters_are_found() {
     let outside = directory(&[("c.ttl", &importing("http://e/c", &[]))]);
     let inside = outside.path().join("my robots, 100% [ü] #1");
     std::fs::create_dir(&inside).expect("a directory");

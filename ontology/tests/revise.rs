@@ -265,7 +265,7 @@ impl Random {
 
 /// Compares updates with the oracle for each seed: starts with random statements, then asserts and
 /// retracts random statements twice. With `equalities`, every change also asserts an equality and
-/// retracts one.
+/// retracts a stated one, if there is one.
 fn check(seeds: std::ops::Range<u64>, equalities: bool) {
     for seed in seeds {
         let mut random = Random((seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);

@@ -26,8 +26,7 @@ use crate::vocabulary::SAME_AS;
 
 impl Engine {
     /// Replaces the rules and returns the net change of all facts that hold, sorted. Unless equality is
-    /// switched on or off, the cost usually depends only on the difference between the programs and its
-    /// consequences.
+    /// switched on or off, usually only consequences of the difference between the programs are derived again.
     ///
     /// # Errors
     /// Returns the errors of [`Engine::with_limits`]. After an error, the engine is in its previous state.

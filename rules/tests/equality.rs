@@ -200,9 +200,9 @@ fn large_classes_are_listed_in_brief() {
     assert!(brief.iter().all(|fact| fact.arguments[0] == brief[0].arguments[0]));
 }
 
-/// Swaps pairs of names in random scripts: each change deletes one pair and inserts another, among facts
-/// about all names. After each change, facts, statements and explanations equal those of a new engine. With
-/// `exchanges_rules`, every change also removes and adds rules.
+/// Swaps pairs of names in random scripts: each change deletes one pair, if there is one, and inserts another,
+/// with other facts. After each change, the facts, which of them are stated and which have explanations equal
+/// those of a new engine. With `exchanges_rules`, every change also selects the rules at random.
 fn swap_pairs(scripts: u64, exchanges_rules: bool) {
     for seed in 0..scripts {
         let random = std::cell::Cell::new(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);

@@ -1,4 +1,4 @@
-//! Robustness: no input makes a parser panic, and parsed values are printed and parsed to the same values.
+//! Robustness: random inputs do not make a parser panic, and parsed values are printed and parsed to the same values.
 
 use metaplan_rules::{Engine, Limits, Literal, Prefixes, Symbols, parse_rules, print_rules};
 use proptest::prelude::*;

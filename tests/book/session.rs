@@ -41,8 +41,8 @@ impl Session {
     pub fn new() -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         copy_project(&directory);
-        // `metaplan-verify` is always the one built with the tests. Installing it would compile everything
-        // again with other features.
+        // `metaplan-verify` is the one built with the tests unless `METAPLAN_PROGRAMS` contains one. Installing
+        // it would compile everything again with other features.
         let built = verifier().parent().expect("a folder").display().to_string();
         let installed = std::env::var("METAPLAN_PROGRAMS").ok();
         let path = std::env::var("PATH").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Test of the validator on plans of up to three steps for tiny tasks, with all start times that can matter.
+//! Test of the validator on plans of up to three steps for tiny tasks.
 //!
 //! Each plan is executed by the project's validator and by the oracle's executor. Both must agree on
 //! validity, on whether only the goal fails, and on the value. The best plan that the *validator* accepts is

@@ -1,4 +1,4 @@
-//! Regression tests from user reports: tasks on which the planner was wrong, with the correct answer in each mode.
+//! Regression tests from user reports: tasks on which the planner was wrong, with the correct answers.
 //!
 //! Small tasks are written out; larger ones are files in `field/`. The correct answers follow the definition
 //! of a plan. Where an answer differs from the user's report, a comment gives the reason.

@@ -7,7 +7,8 @@
 //!
 //! Environment variables: `ORACLE_FROM` is the first seed, `ORACLE_TASKS` the number of tasks, `ORACLE_SAVE` a
 //! directory for the files of failing tasks, `ORACLE_FRONTS` one for the certificates of fronts. If `ORACLE_STOP` is
-//! set, a run ends at the first failure. `mutants.toml` lists faults of the planner that the oracles must detect.
+//! set, a run ends at the first failure (not in [`front`] and [`enumerate`]). `mutants.toml` lists faults of the planner
+//! that the oracles must detect.
 
 // Readability of the oracles matters more than their speed.
 #![allow(clippy::format_collect, clippy::format_push_string, clippy::needless_for_each)]

@@ -425,7 +425,7 @@ fn declared_conclusions_without_facts_are_reported() {
     }
 }
 
-/// The public domain, with an inferred predicate instead of a class in one condition, has the same optimum as
+/// The public domain, with an inferred predicate instead of one class in its conditions, has the same optimum as
 /// its export, and a valid certificate.
 #[test]
 fn public_domain_with_conclusions_has_the_optimum_of_its_export() {

@@ -84,7 +84,7 @@ fn unfolded(model: &Model, budget: usize, greatest: bool) -> f64 {
 /// The oracle is value iteration on the process that is unfolded over the remaining budget. The models have
 /// cycles of choices with and without reward.
 #[test]
-fn bounds_on_rewards_are_those_of_the_unfolded_process() {
+fn reward_bounded_probabilities_are_those_of_the_unfolded_process() {
     let mut random = Random(11);
     let mut between = 0;
     for _ in 0..200 {

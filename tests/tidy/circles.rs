@@ -1,7 +1,7 @@
 //! Test that the modules of a crate do not import from each other in a cycle.
 //!
-//! A file imports from a module if one of its paths (`use` or inline) refers to this module. Code below
-//! `#[cfg(test)]` is ignored, because tests can import from any module.
+//! A file imports from a module if one of its paths (`use` or inline, but not in arguments of macros) refers to this
+//! module. Modules and functions for tests are ignored, because tests can import from any module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -8,7 +8,7 @@ const TABLES: [&str; 10] =
     ["rules", "ontology", "pddl", "task", "probabilistic", "mission", "verify", "src", "ros", "fleet"];
 const LETTERS: &str = "EMNOPQR";
 
-/// Returns the codes in a text, except for those in comments and tests.
+/// Returns the codes in a text before the first `#[cfg(test)]`, except for those in lines of comments.
 fn codes_in(text: &str) -> BTreeSet<String> {
     let library_part = text.split("#[cfg(test)]").next().unwrap_or(text);
     let lines = library_part.lines().filter(|line| !line.trim_start().starts_with("//"));

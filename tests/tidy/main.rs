@@ -85,7 +85,8 @@ fn check(rule: &str, offends: impl Fn(&str, &str) -> Vec<String>) {
     assert!(offenders.is_empty(), "{rule}:\n{}", offenders.join("\n"));
 }
 
-/// Returns the code of a file without tests. `None` if the file does not belong to one of the checked libraries.
+/// Returns the code of a file before the first `#[cfg(test)]`. `None` if the file does not belong to one of the checked
+/// libraries.
 fn library_part<'a>(path: &str, text: &'a str) -> Option<&'a str> {
     let library = [
         "src/",

@@ -9,7 +9,7 @@ const README_LINES: usize = 200;
 
 const NO_PAGES: [&str; 3] = ["target", ".git", "node_modules"];
 
-/// Returns the paths of all Markdown files, relative to the root.
+/// Returns the paths of the Markdown files, relative to the root, without those in folders of [`NO_PAGES`].
 pub fn pages(root: &Path) -> Vec<PathBuf> {
     let mut paths = Vec::new();
     let mut folders = vec![PathBuf::new()];

@@ -336,7 +336,7 @@ impl Judge {
     }
 
     /// Returns `true` if the robot should have reported more about an action by now, judging by the kinds of
-    /// reports that it has already sent.
+    /// reports that have already been delivered.
     fn is_report_due(&self, action: u64) -> bool {
         if self.started.contains(&action) {
             self.progressed.contains(&action)

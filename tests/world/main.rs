@@ -16,9 +16,10 @@
 //!   itself moves with a forbidden design for a bounded number of steps only.
 //! - (b) The believed configuration follows from the messages by the table of
 //!   `docs/reference/events.md`. If the believed design is certain and no message about designs is in
-//!   transit, it is the actual one.
+//!   transit, it is the actual one, unless no loop could know this.
 //! - (c) At the end, each effect was carried out, superseded, abandoned with a report, or implied
-//!   by a report. Effects of ended actions are exempt unless they are reconfigurations.
+//!   by a report. Effects of ended actions are exempt unless they are reconfigurations, as are all
+//!   effects for a robot that has never acknowledged one.
 //! - (d) At the end, the robot is at the goal, or the last decision is that no plan exists, and
 //!   this is true. The loop may also have stopped after repeated failures of a step, or wait for
 //!   reports that the robot never sends.

@@ -26,8 +26,7 @@ pub fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> O
 /// with the same words in another order have distance 1; names of very different lengths have distance
 /// `usize::MAX`.
 fn distance(left: &str, right: &str) -> usize {
-    // Names within the maximum distance of 3 differ in length by at most three letters of at most
-    // four bytes each.
+    // Each of at most 3 edits changes the length by at most four bytes.
     if left.len().abs_diff(right.len()) > 12 {
         return usize::MAX;
     }

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_lie_near_and_others_far() {
+    fn neighbours_lie_near_and_no_places_coincide() {
         for side in [2, 3, 5] {
             let points = layout(side * side, &grid(side));
             let between = |one: usize, other: usize| {

@@ -45,8 +45,8 @@ impl Picture {
     }
 }
 
-/// Replaces control characters, except tabs and line breaks, and U+FFFE and U+FFFF by U+FFFD. XML
-/// does not permit most of them.
+/// Replaces U+FFFE, U+FFFF, and control characters except tabs and line breaks by U+FFFD. XML
+/// forbids many of them.
 pub(crate) fn clean(text: &str) -> String {
     let allowed = |character: char| {
         matches!(character, '\n' | '\t' | '\r')

@@ -175,7 +175,7 @@ fn numbers_stand_at_the_arrow_of_their_direction() {
 }
 
 #[test]
-fn ways_taken_again_and_again_keep_all_their_numbers() {
+fn ways_taken_again_and_again_have_step_numbers() {
     let moves: Vec<(usize, usize)> =
         (0..30).map(|index| if index % 2 == 0 { (0, 1) } else { (1, 0) }).collect();
     check_all("a shuttle", &known(&[(0.0, 0.0), (5.0, 0.0)]), &moves, &["fd_a"]);

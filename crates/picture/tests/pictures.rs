@@ -1,4 +1,4 @@
-//! Pictures contain all data, accept arbitrary names, and are identical for identical data.
+//! Pictures contain their data, escape names, and are identical for identical data.
 
 use metaplan_picture::{
     Axis, Bound, Change, Checked, Curve, Design, Group, Happening, Kind, Log, Map, Part, Place, Plan, Points,
@@ -88,7 +88,7 @@ fn values<'a>(document: &'a Document<'_>, attribute: &str) -> Vec<&'a str> {
 }
 
 #[test]
-fn everything_is_in_the_pictures() {
+fn lanes_places_and_designs_are_in_the_pictures() {
     let report = report(10, "");
     let pictures = report.pictures();
     let find = |name: &str| &pictures.iter().find(|(file, _)| file == name).expect(name).1;
@@ -150,7 +150,7 @@ fn the_same_data_give_the_same_bytes() {
 fn pages_grow_with_the_number_of_steps() {
     let size = |steps: usize| report(steps, "").html().len();
     assert!(report(1000, "").html().contains("data-step=\"1000\""));
-    // The size shows whether the work is proportional to the number of steps, on a machine of any speed.
+    // Unlike a time, the size of the page does not depend on the machine.
     assert!(size(1000) < 3 * size(500), "{} and {} bytes", size(1000), size(500));
 }
 
@@ -190,7 +190,7 @@ actions  ▕move p0············▕move p1············▕
 }
 
 #[test]
-fn terminals_of_any_width_hold_the_picture() {
+fn terminals_of_60_to_139_columns_hold_the_picture() {
     let mut night = plan(16, "");
     let mut now = 0.0;
     for (step, index) in night.steps.iter_mut().zip(0..) {
@@ -338,7 +338,7 @@ fn rounding_errors_of_times_do_not_make_bars_overlap() {
 }
 
 #[test]
-fn short_bars_have_the_number_of_their_step() {
+fn bars_have_their_name_or_step_number_or_no_text() {
     let mut plan = plan(30, "");
     plan.steps[29].end = 300.0;
     let text = plan.svg();
@@ -367,7 +367,7 @@ fn short_bars_have_the_number_of_their_step() {
     assert!(actions.contains(">30<") || actions.contains("move p29"), "the long one is named: {actions}");
 }
 
-/// A plot without values has no axis.
+/// A plot without values has no numbers on its axis.
 #[test]
 fn nothing_is_said_in_words() {
     let group = |values: Vec<(f64, String)>| Group {

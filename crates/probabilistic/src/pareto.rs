@@ -49,7 +49,7 @@ pub struct Constrained<N> {
     /// The minimum over randomised policies.
     pub randomised: Bounded<N>,
     /// The least loss found over deterministic policies whose memory is the set of reached targets,
-    /// and `true` if it is proved to be the minimum. `None` if no such policy within the limit was
+    /// and `true` if the minimum is proved (in doubles, to lie within the bounds). `None` if no such policy within the limit was
     /// found.
     pub deterministic: Option<(Bounded<N>, bool)>,
 }

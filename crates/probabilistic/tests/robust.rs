@@ -1,5 +1,5 @@
-//! No text makes the parser or the checker panic. A model that is written as text and parsed again
-//! is unchanged.
+//! Random texts do not make the parser or the checker panic. A model that is written as text and parsed
+//! again is unchanged.
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, check};
 use metaplan_probabilistic::explore::Bounds;

@@ -145,11 +145,10 @@ fn bounds_of_tiny_values_are_relative() {
     assert!(bounded.value > 0.0 && bounded.upper - bounded.lower <= 1e-6 * bounded.value, "{bounded:?}");
 }
 
-/// Wide bounds are available immediately; improving them would take 17 s and must be skipped. The
-/// expected value was computed exactly by Metaplan itself. The model is from the Quantitative
-/// Verification Benchmark Set.
+/// The bounds are wide; improving them would take 17 s. The expected value was computed exactly by
+/// Metaplan itself. The model is from the Quantitative Verification Benchmark Set.
 #[test]
-fn wide_bounds_are_improved_only_if_that_is_cheap() {
+fn wide_bounds_of_a_large_model_enclose_its_value() {
     let Some(path) = data("real/qvbs/mdp/zeroconf/zeroconf.prism") else { return };
     let model = std::fs::read_to_string(path).expect("a file");
     let open = ["const int N;", "const int K;", "const bool reset;"];

@@ -86,7 +86,7 @@ class Step:
 
 
 class _Numbers:
-    """Reads the exact numbers of a plan, all as ``Fraction`` if one of them has no finite decimal."""
+    """Reads the exact numbers of a plan: ``int`` and ``Fraction`` if one of them has no finite decimal, else ``int`` and ``Decimal``."""
 
     def __init__(self, texts: Iterable[str | None]) -> None:
         self._fractions = any(text is not None and "/" in text for text in texts)
@@ -140,7 +140,7 @@ class Plan(Answer):
         self.cost: Number | None = numbers.maybe(exact_numbers["cost"])
         """Value of the metric, or of the first objective; ``None`` without a plan."""
         self.lower_bound: Number | None = numbers.maybe(exact_numbers["lower_bound"])
-        """Lower bound on the cost of every plan; ``None`` if nothing is proved."""
+        """Bound on the metric: no plan has a better value. ``None`` if nothing is proved."""
         self.steps: list[Step] = numbers.steps(answer["steps"], exact_numbers["steps"])
         """Actions in order of execution."""
         self.proof: dict[str, Any] | None = answer["proof"]
@@ -175,7 +175,7 @@ class Plan(Answer):
 
     @property
     def optimal(self) -> bool:
-        """``True`` if it is proved that no plan has a lower cost."""
+        """``True`` if it is proved that no plan is better."""
         return self.status == "optimal"
 
     @property

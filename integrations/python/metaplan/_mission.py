@@ -258,8 +258,8 @@ class Mission:
         :param certificate: a directory that does not exist yet; :func:`metaplan.verify` checks what is written there. A
             result without a proof that a certificate can express, for example at a limit, is an error; the plan is then
             not returned
-        :param on_improvement: called with cost, lower bound, gap (0 to 1) and number of steps of each better plan; planning ends when it
-            returns ``False``
+        :param on_improvement: called with cost, bound, gap (their distance, divided by the cost) and number of steps for better plans and
+            better bounds; planning ends when it returns ``False``
         :raises metaplan.Error: if the mission cannot be planned for
         :raises KeyboardInterrupt: after Ctrl-C, if there is no plan yet or no certificate for it, or with ``pareto``
         """
@@ -317,7 +317,7 @@ class Mission:
 
         :param loss: a component that may fail, and the probability of its failure at each move
         :param battery_unit: battery charge of one level of the process
-        :param penalty: time that is added for a mission that does not reach its goal; by default ten times the time of the plan
+        :param penalty: time that is added for a mission that does not reach its goal; by default ten times the time of the plan, at least 10
         :param state_limit: maximum number of states of the process
         """
         return Comparison(self._native.compare(loss, battery_unit, penalty, state_limit))

@@ -63,7 +63,7 @@ class Knowledge:
 
 
 def load(source: Any, path: str | os.PathLike[str] | None = None) -> Knowledge:
-    """Reads an owlready2 world or ontology, an rdflib graph, or a mapping of these.
+    """Reads an owlready2 world, the world of an owlready2 ontology, an rdflib graph, or a mapping of these.
 
     :param path: where to write the document; by default it is temporary
     """

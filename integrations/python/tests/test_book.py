@@ -1,4 +1,4 @@
-"""Runs the code blocks of the book and of the README."""
+"""Runs the Python code blocks of two pages of the book and of the README."""
 
 import re
 import runpy

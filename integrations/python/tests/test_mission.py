@@ -167,7 +167,7 @@ def test_manifests_are_files_texts_and_mappings():
         metaplan.Mission.load({**OWN, "planing": {}}, ROOT)
 
 
-def test_texts_of_a_manifest_can_have_any_characters():
+def test_texts_of_a_manifest_can_have_quotes_and_backslashes():
     text = 'robot \U0001f916 "R\\1"'
     assert metaplan.Mission.load({**OWN, "name": text}, ROOT).name == text
 
@@ -219,7 +219,7 @@ def test_model_checking():
     assert caught.value.line == 1
 
 
-def test_the_loop_is_that_of_the_command_line():
+def test_the_loop_gives_the_same_answers_for_asyncio():
     events = [
         {"event": "action_succeeded", "action": 1, "time": 5},
         {"event": "component_status", "component": "c_kinect", "status": "FALSE", "time": 6},

@@ -40,7 +40,7 @@ def value(problem, plan):
 
 
 def cases():
-    """Yields all test cases as pairs of name and case. Prints the names of those whose files are missing."""
+    """Yields test cases as pairs of name and case. Prints the modules whose cases cannot be read."""
     yield from get_example_problems().items()
     for folder, _, files in sorted(os.walk(CASES)):
         for file in sorted(files):

@@ -1,4 +1,4 @@
-"""Engines of unified-planning, on its own test cases."""
+"""Metaplan's engines for unified-planning, on the test cases of unified-planning and on random problems."""
 
 import random
 import warnings

@@ -75,7 +75,7 @@ struct Diagnostic {
     /// Most severe level of all received statuses. `message` belongs to it.
     level: u8,
     message: String,
-    /// Last value that begins with a number, by key.
+    /// Last value whose first word is a number, by key.
     numbers: BTreeMap<String, String>,
 }
 
@@ -92,7 +92,7 @@ struct Robot {
 /// Observes the robot, and writes the settings.
 ///
 /// # Errors
-/// The mission or a parameter of the command line is wrong, or the file exists or cannot be written.
+/// The mission or a parameter of the command line is wrong, a subscription fails, or the file exists or cannot be written.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     if let Some(file) = options.output.as_ref().filter(|file| file.exists()) {
         let text = format!("{} exists and is not overwritten", file.display());

@@ -98,7 +98,7 @@ fn main() -> ExitCode {
 }
 
 /// Exit status for errors: 75 (`EX_TEMPFAIL` of `sysexits.h`) if the network is not up yet, so that a
-/// supervisor tries again; 2 for errors that remain until a person corrects a file or an argument.
+/// supervisor tries again; otherwise 2.
 fn status(messages: &[Message]) -> u8 {
     let is_temporary = messages.iter().all(|message| message.code == "N120");
     if is_temporary { 75 } else { 2 }

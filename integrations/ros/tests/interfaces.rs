@@ -1,5 +1,5 @@
 //! Checks the bytes of messages against expected CDR written by hand, and the type hashes against
-//! other implementations. (CDR: OMG CORBA 3.4, 9.3: natural alignment from the start of the body,
+//! those of rosidl. (CDR: OMG CORBA 3.4, 9.3: natural alignment from the start of the body,
 //! strings with their length and a zero.)
 
 use byteorder::LittleEndian;

@@ -204,7 +204,7 @@ fn the_overlay_is_where_ros2_run_looks() {
 /// Checks the domains of PlanSys2's own tests, including those that PlanSys2's tests declare
 /// invalid.
 #[test]
-fn domains_of_plansys2_are_valid() {
+fn domains_of_plansys2_are_judged_as_expected() {
     let (_directory, [_, void]) = files("", VOID);
     for (name, is_valid) in [
         ("plansys2_popf_plan_solver_test_pddl_domain_1_ok.pddl", true),

@@ -1,9 +1,9 @@
-//! Decides if statements are entailed by the facts and rules of an engine. Assertions of named classes and
+//! Tries to prove that statements are entailed by the facts and rules of an engine. Assertions of named classes and
 //! properties are looked up. Most other axioms are proved with *fresh individuals*, about which only the
 //! axiom's condition is assumed, or by *refutation*: the negation is assumed and contradicts the knowledge.
 //!
-//! The procedure is sound, because proofs use only rules that are sound for the assumed individuals. Keys apply only
-//! to individuals with a name, and rules with a negation or an aggregate take no part in proofs from assumptions. No
+//! The procedure is sound, because proofs use only rules that are sound for the assumed individuals. Keys apply to
+//! fresh individuals only in proofs of keys, and rules with a negation or an aggregate take no part in proofs from assumptions. No
 //! built-in holds for a fresh value, except a data range that contains all values. Fresh values and individuals differ
 //! only if this is assumed. The procedure is incomplete, because the rules are those of OWL 2 RL.
 

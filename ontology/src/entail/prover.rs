@@ -89,7 +89,7 @@ pub(super) fn literal(literal: &crate::owl::Literal) -> Literal {
     Literal::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
 }
 
-/// Relation of the individuals and values that the knowledge base names.
+/// Relation of the individuals and values to which keys apply: those in the facts of the knowledge base.
 const NAMED: &str = "urn:metaplan:named";
 
 /// Returns the fact that an individual or a value has a name, so that keys apply to it.
@@ -99,8 +99,8 @@ pub(super) fn named(engine: &mut Engine, symbol: Symbol) -> Fact {
 
 /// Returns a copy of the engine with the rules that are sound for fresh individuals. Rules with a negation or an
 /// aggregate are removed: they draw conclusions from the absence of facts, but facts about a fresh individual are absent
-/// because it represents all individuals. Keys are restricted to individuals with a name, as OWL defines them; a fresh
-/// individual can be one without a name.
+/// because it represents all individuals. Keys are restricted to individuals in the facts of the knowledge base: in OWL, keys
+/// apply only to named individuals, and a fresh individual can be one without a name.
 pub(super) fn monotone(engine: &Engine) -> Result<Engine, Error> {
     let is_closed_world = |atom: &Atom| atom.is_negated() || matches!(atom, Atom::Aggregate { .. });
     let is_monotone = |rule: &Rule| !rule.body.iter().any(is_closed_world);

@@ -28,7 +28,7 @@ pub(super) fn axioms(axioms: &mut Vec<AnnotatedAxiom>, names: &Names) {
     });
     arrange(axioms, order.into_iter().map(|(_, index)| index).collect());
     axioms.dedup();
-    // The axioms without a key are few, and most of them sort before assertions. The stable sort merges the
+    // The axioms without a key are usually few, and most of them sort before assertions. The stable sort merges the
     // two sorted runs.
     let count = unkeyed.len();
     axioms.extend(unkeyed);

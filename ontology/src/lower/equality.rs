@@ -2,13 +2,13 @@
 //!
 //! OWL makes no unique name assumption: two names can denote the same individual. If a functional property has two
 //! values, for example, both names denote one individual. The engine then treats `sameAs` as equality. `differentFrom`
-//! holds if it is stated, if a rule of the knowledge base concludes it, or if it follows from disjoint named classes,
+//! holds if it is stated, if a rule of the knowledge base concludes it, or if it follows from `DisjointClasses`,
 //! from different values of functional properties, or from different subjects of inverse functional ones. Differences
-//! of the last three kinds are derived only if a rule depends on `differentFrom`.
+//! of the last three kinds, and those of large stated sets, are derived only if a rule depends on `differentFrom`.
 //!
 //! Under the unique name assumption ([`UniqueNames`](super::Equality::UniqueNames)) any two names differ, and the only
-//! rule of this file is the constraint that no two names are the same. A functional object property, a cardinality of at
-//! most 1, a key, and a class of listed individuals become constraints, too. Without the check
+//! rule of this file is the constraint that no two names are the same. A functional object property, an object
+//! cardinality of at most 1, a key, and a class of listed individuals become constraints, too. Without the check
 //! ([`UncheckedUniqueNames`](super::Equality::UncheckedUniqueNames)) none of these has a consequence.
 
 use std::collections::HashSet;

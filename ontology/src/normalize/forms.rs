@@ -176,8 +176,8 @@ fn correct_types(graph: &mut Graph) {
 const BUILT_IN_DATATYPES: [&str; 6] =
     [rdfs::LITERAL, rdf::PLAIN_LITERAL, rdf::LANG_STRING, rdf::XML_LITERAL, owl::REAL, owl::RATIONAL];
 
-/// Returns `true` if the first member of a list is a literal or a data range. If the first member is an expression
-/// with a list, but without a type, the first member of that list decides.
+/// Returns `true` if the first member of a list is a literal or a data range. If the first member is another
+/// expression with a list, the first member of that list decides.
 fn has_values(graph: &Graph, list: &Term, datatypes: &FxHashSet<Term>) -> bool {
     let mut list = list.clone();
     // The limit also ends cycles.

@@ -164,8 +164,8 @@ fn kinds(graph: &Graph) -> FxHashMap<&str, DeclaredKinds> {
     kinds
 }
 
-/// Returns the IRIs that are the subject of an annotated axiom (`owl:annotatedSource`). Their triples are not
-/// read one by one, because an annotation refers to several of them.
+/// Returns the IRIs that are the subject of an annotated axiom (`owl:annotatedSource`). Their triples stay in the
+/// graph, because horned-owl has to match them with the annotations.
 fn patterns(graph: &Graph) -> FxHashSet<&str> {
     let annotated = graph.iter().filter(|(_, triple)| triple.predicate.as_str() == owl::ANNOTATED_SOURCE);
     annotated.filter_map(|(_, triple)| iri_of(&triple.object)).collect()

@@ -36,7 +36,7 @@ pub(crate) const TRUE: &str = "urn:metaplan:true";
 pub(crate) const ORIGIN: &str = "urn:metaplan:origin";
 
 /// Returns the origin of each rewritten rule. Each element of `parts` is a document: the index of its first
-/// triple, and its ontology IRI. Unreadable rules are removed with a warning.
+/// triple, and its ontology IRI or name. Unreadable rules are removed with a warning.
 pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut Vec<Warning>) -> Vec<Origin> {
     let mut pass = Pass::new(graph);
     let (mut origins, mut positions) = (Vec::new(), vec![0; parts.len()]);

@@ -17,7 +17,7 @@ pub struct ReadOptions {
     /// If `true`, documents may be empty (for documents with additions or retractions).
     pub allow_empty: bool,
     /// If `true`, documents must be N-Triples, and their imports are not resolved. For untrusted documents: they
-    /// cannot cause other files to be opened, and have no XML entities, which expand the text. Normalisation can still
+    /// cannot cause other documents to be opened, and have no XML entities, which expand the text. Normalisation can still
     /// expand shared lists and n-ary axioms to quadratic size.
     pub closed: bool,
     /// If `true`, imports are not followed (for documents that change a knowledge base).

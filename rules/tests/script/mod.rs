@@ -372,8 +372,8 @@ fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTree
     facts
 }
 
-/// Checks that the derivation of all facts is accepted by `replay`, and that a missing or an invented step
-/// is rejected.
+/// Checks that the derivation of all facts is accepted by `replay` and, without equality, that a missing or an
+/// invented step is rejected.
 fn check_replay(engine: &Engine, stated: &BTreeSet<Fact>, facts: &BTreeSet<Fact>) {
     let rules = engine.program().rules.iter().filter(|rule| !rule.head.is_empty()).cloned().collect();
     let program = Program { rules, ..engine.program().clone() };

@@ -3,7 +3,7 @@
 //!
 //! Either the mission or its export is planned with the default thresholds, and the other with
 //! [`Thresholds::NONE`]. Without thresholds, tasks that are small enough for brute force also reach
-//! stubborn sets, h² mutexes, landmarks, label trees and all engines of the portfolio.
+//! stubborn sets, h² mutexes, landmarks, label trees and further engines of the portfolio.
 //!
 //! Some generators and oracles are shared with the planner's own tests in `crates/planner/tests`.
 

@@ -11,7 +11,7 @@ pub enum Style {
     Small,
     /// 1 to 5.
     Positive,
-    /// One or two digits after the point.
+    /// At most two digits after the point.
     Short,
     /// -5 to 5.
     Signed,
@@ -95,7 +95,7 @@ pub fn relation(rng: &mut Rng) -> Relation {
     if once_in(rng, 8) { Relation::Equal } else { one_of(rng, &Relation::ALL) }
 }
 
-/// Returns a number that is equal to `value`, or just above or below it.
+/// Returns a number that is equal to `value`, or differs from it by at most 1 or its 10^-16th part.
 pub fn near(rng: &mut Rng, value: &Number) -> Number {
     let step = match rng.u32(0..8) {
         0..=3 => return value.clone(),

@@ -206,7 +206,7 @@ impl Printer<'_> {
     }
 }
 
-/// Formats a number as a decimal if it is finite, otherwise as a quotient of integers.
+/// Formats a number as a decimal if [`text_of`] can, otherwise as a quotient of integers.
 fn number(value: &Number) -> String {
     text_of(value).unwrap_or_else(|| format!("(/ {} {})", value.numer(), value.denom()))
 }

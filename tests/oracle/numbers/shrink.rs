@@ -115,12 +115,12 @@ fn smaller_happenings(happening: &Happening) -> Vec<Happening> {
 /// no such values.
 fn without_unused(task: &Task) -> Option<Task> {
     let bare = Task { values: Vec::new(), ..task.clone() };
+    // The printed domain of the task without values declares only the used functions.
     let (domain, problem) = super::print::print(&bare);
     let mut smaller = task.clone();
     smaller.values.retain(|(function, ..)| {
         let name = &task.functions[*function].name;
         [format!("({name} "), format!("({name})")].iter().any(|f| domain.contains(f) || problem.contains(f))
     });
-    // The printed domain of the task without values declares only the used functions.
     (smaller.values.len() < task.values.len()).then_some(smaller)
 }

@@ -25,7 +25,7 @@ pub fn tune(task: &mut Task, wishes: &Wishes, rng: &mut Rng) {
     task_with_wishes.goal =
         wishes.atoms.iter().map(|(p, objects)| Condition::Holds(ground_atom(*p, objects))).collect();
     let Some(open) = ground(&task_with_wishes, &wishes.numbers, MAX_INSTANCES) else {
-        // There are too many instances for random walks, so the thresholds are drawn at random.
+        // There are too many instances for random walks, so the thresholds are drawn at random, and the goal stays empty.
         return close(task, &[], rng);
     };
     let mut observed: Vec<Vec<Number>> = Vec::new();

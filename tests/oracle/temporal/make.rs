@@ -323,7 +323,7 @@ impl Maker {
 
     fn effects(&mut self, variables: &[usize], counts: &[usize]) -> Vec<Effect> {
         let mut effects: Vec<_> = (0..self.pick(counts)).map(|_| self.effect(variables, 2)).collect();
-        // Two changes of one number, one of which is conditional, conflict in some states only.
+        // Two changes of one number, at least one of which is conditional, can conflict in some states only.
         if self.chance(self.flavour.conditional / 3) {
             let first = self.change(LEVEL, variables.len());
             let condition = self.condition(variables, 1);
@@ -380,7 +380,7 @@ impl Maker {
         };
         if let (Some((predicate, _)), Some(slot)) = (self.designs, self.slot.take()) {
             let (Body::Instantaneous(start) | Body::Durative { start, .. }) = &mut body;
-            // All actions require the first object as their function.
+            // The function of every design slot is the first object.
             let solves = Atom { predicate, terms: vec![Term::Var(slot), Term::Object(0)] };
             if let Condition::All(parts) = &mut start.condition {
                 parts.push(Condition::Atom(solves));

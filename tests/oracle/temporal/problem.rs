@@ -116,9 +116,9 @@ impl Maker {
             return;
         }
         let world = World::new(self.task.clone());
-        // The search is limited to 40 nodes, so the goal is reachable by few actions.
+        // The search is limited to about 40 nodes, so its states are reachable by few actions.
         let search = Search::new(&world, 40);
-        // A state from the second half of the search needs several actions.
+        // States from the second half of the search usually need more actions.
         let (state, ..) = search.nodes[self.random.usize(search.nodes.len() / 2..search.nodes.len())].clone();
         let initial = search.nodes[0].0.atoms;
         let mut literals: Vec<(bool, Atom)> = Vec::new();

@@ -116,8 +116,8 @@ impl Node {
     }
 
     /// Subscribes to a topic for the lifetime of the node. `take` receives each valid message of a writer
-    /// with the expected type. Messages that were published before the subscription are received only if
-    /// `qos` is transient local.
+    /// with the expected type. Unless `qos` is transient local, messages that were published before the
+    /// subscription and arrive in its first five seconds are discarded.
     ///
     /// # Errors
     /// Fails if the name is invalid, or the topic exists with another type.

@@ -111,9 +111,9 @@ impl Procedures {
         conditions.flat_map(|condition| self.clients.servers(&condition)).collect()
     }
 
-    /// Waits for the services of all modes of a function, at most for `within`. Returns the missing ones of
-    /// the mode that lacks the fewest. Services that are used after a command may be started by it and are
-    /// not waited for.
+    /// Waits for the services of all modes of a function, for each at most for `within`. Returns the missing
+    /// ones of the mode that lacks the fewest. Services that are used after a command may be started by it and
+    /// are not waited for.
     pub(crate) async fn missing(&self, function: &str, within: Duration) -> Vec<String> {
         let Some(procedures) = self.functions.get(function) else { return Vec::new() };
         let of_mode = |procedure: &'_ Procedure| {
@@ -194,7 +194,7 @@ impl Procedures {
     }
 
     /// Returns `true` if the services of all modes that could not be put into effect because of a silent node answer
-    /// again. These modes are then no longer recorded as silent.
+    /// again, except services that are used after a command. These modes are then no longer recorded as silent.
     pub(crate) async fn answers(&self, function: &str) -> bool {
         let Some(procedures) = self.functions.get(function) else { return false };
         let silent = procedures.silent.lock().unwrap_or_else(PoisonError::into_inner).clone();

@@ -462,7 +462,7 @@ mod tests {
     }
 
     #[test]
-    fn all_kinds_of_steps_are_read() {
+    fn steps_of_nodes_services_and_commands_are_read() {
         let procedure = read(
             r#"timeout = 2.5
             steps = [

@@ -88,7 +88,7 @@ fn a_plan_whose_design_is_lost_is_cancelled_and_made_anew() {
 }
 
 #[test]
-fn where_there_is_no_plan_it_waits() {
+fn without_a_problem_it_waits() {
     let domain = domain();
     let robot = node(domain, "robot", "");
     let problem = experts(&robot);
@@ -120,7 +120,7 @@ fn it_gives_up_and_it_can_be_stopped() {
     let end = controls.join().expect("no panic");
     assert!(end.as_ref().is_err_and(|text| text.starts_with("5 consecutive plans have failed")), "{end:?}");
     assert_eq!(goals.lock().expect("no panic").len(), 5);
-    // Without an executor, cancellation has no effect.
+    // Without an executor, nothing can be cancelled. The controller ends nevertheless.
     let other = crate::common::domain();
     experts(&node(other, "robot", ""));
     let controls = control(other, &stop);

@@ -1,4 +1,4 @@
-//! Tests with two nodes of this package over loopback.
+//! Tests with several nodes of this package over loopback.
 
 mod common;
 mod controller;

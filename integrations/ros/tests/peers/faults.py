@@ -37,7 +37,7 @@ def battery(setting: Setting) -> str:
 
 @scenario()
 def refuses(setting: Setting) -> str:
-    """A design is refused: the program selects the next best one, and soon stops to request the refused one."""
+    """A design is refused: the program selects the next best one, and requests the refused one at most twice."""
     with play(setting) as (robot, _):
         robot.modes.faults.refuses = {"fd_spiral_high"}
         robot.oracle.world.refused = {"fd_spiral_high"}

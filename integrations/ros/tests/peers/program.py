@@ -92,7 +92,7 @@ class Program:
         return "\n".join("    | " + line[:240] for line in self.output().splitlines()[-lines:])
 
     def clean(self) -> None:
-        """Ends the program and removes its files."""
+        """Ends the program and removes its files, unless `METAPLAN_KEEP` is set."""
         if self.running():
             self.kill()
         if not os.environ.get("METAPLAN_KEEP"):

@@ -129,7 +129,7 @@ def _change_state() -> object:
 
 @scenario()
 def earlier_peer(setting: Setting) -> str:
-    """The peer of the first experiments is a client of `/mros/objective`: its goal is accepted and it gets feedback."""
+    """The goal of the peer of the first experiments is accepted; on Cyclone DDS, it also gets feedback."""
     if not EARLIER.is_dir():
         return f"NOT PLAYED: {EARLIER.relative_to(ROOT.parent)} is not there"
     program = Program(setting.program, "reasoner", setting.vendor, 0)

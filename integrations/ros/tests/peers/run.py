@@ -132,7 +132,7 @@ def play_all(arguments: argparse.Namespace) -> list[dict[str, object]]:
 
 
 def self_test(arguments: argparse.Namespace) -> int:
-    """Checks that the scenarios pass with a correct stand-in, and fail with each fault. Returns the exit status."""
+    """Checks that missions pass with a correct stand-in, and fail with each fault. Returns the exit status."""
     fooled = []
     for fault, name, expected in (
         ("", "mission-manager", True),

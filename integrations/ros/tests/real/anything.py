@@ -128,7 +128,7 @@ def fast(start: str, stop: str) -> tuple:
 
 
 def any_service() -> None:
-    """Controllers are switched and a map is loaded; a refused map is undone."""
+    """Controllers are switched and a map is loaded; if the map is refused, the switch is undone."""
     settings = TYPES + STEPS.replace(DRIVING, SWITCHING)
     scout, controllers = Scout(), Controllers()
     with nodes(controllers), scout.managed(settings):

@@ -3,8 +3,8 @@
     python run.py METAPLAN_ROS [SCENARIO...]
     python run.py METAPLAN_ROS --cold-starts N
 
-The second form starts each role N times, with a new client each time; it is not part of CI. Each scenario uses a ROS domain
-of its own and starts a new process of the program. Exits with 1 if a scenario fails.
+The second form starts each role N times, with a new client each time; it is not part of CI. All scenarios of a run use one ROS
+domain; each starts new processes of the program. Exits with 1 if a scenario fails.
 """
 
 import functools
@@ -439,7 +439,7 @@ def value_signal() -> None:
 
 
 def silent_signal() -> None:
-    """A sensor that falls silent counts with its worst value; one that repeats its value does not."""
+    """A sensor that falls silent is reported; one that repeats its value is not."""
     settings = STEPS + SIGNALS.replace('node = "/amcl"', 'node = "/controller"').replace('state = "active"\n', "", 1)
     scout = Scout()
     level = [30.0]
@@ -501,7 +501,7 @@ def simulated_time() -> None:
 
 
 def discover() -> None:
-    """The written settings contain the parts of the robot, and can be used without changes."""
+    """The written settings contain the parts of the robot, and the rule for the lidar can be used without changes."""
     scout = Scout()
     scans = scout.equipment.create_publisher(LaserScan, "/scan", qos_profile_sensor_data)
     scout.equipment.create_timer(0.1, lambda: scans.publish(LaserScan()))
@@ -567,7 +567,7 @@ SCENARIOS = {
 
 
 def main() -> None:
-    """Runs the scenarios that the command line names, or all. `--shard 2/3` runs the second third of all."""
+    """Runs the scenarios that the command line names, or all. `--shard 2/3` runs every third one, from the second on."""
     rclpy.init()
     scenarios = SCENARIOS
     if sys.argv[2:3] == ["--shard"]:

@@ -1,8 +1,8 @@
 """Runs the tutorial docs/tutorial/ros-robot.md as printed, in a directory in which only `integrations` exists.
 
 Usage: tutorial.py ROOT DIRECTORY install, with a network, and then tutorial.py ROOT DIRECTORY run, which needs only the loopback interface and
-`metaplan-ros` in the path. The comment before a block says whether and when it is run. The outputs that the page prints must be part of the real
-ones; the robot's nodes work in parallel, so that the order of its lines is compared only where it is certain.
+`metaplan-ros` in the path. The comment before a block says whether and when it is run. The settings that the page prints must be part of the
+real ones, and the robot must print the same lines. Its nodes work in parallel, so the order of lines is compared only where it is certain.
 """
 
 import collections

@@ -1,8 +1,9 @@
 //! The `temporal` library in its basic mode: durations, shifted moments, and Allen's relations between instants and
 //! periods.
 //!
-//! A moment is an `xsd:date`, an `xsd:dateTime`, or the text of either. A text may be truncated after the year,
-//! month, day, hour or minute (`1998-12-02T12`); the missing parts have their smallest values. Moments are compared
+//! A moment is an `xsd:date`, an `xsd:dateTime`, or the text of either. A text without a time zone may be truncated
+//! after the year, month, day, hour or minute (`1998-12-02T12`); the missing parts have their smallest values. The text
+//! of a date has no time zone. Moments are compared
 //! by *granules*: years, months, days, hours, minutes, seconds or milliseconds. For example, 1999-12-31 and
 //! 2000-01-01 differ by one year at the granularity of years. Moments with a time zone are converted to UTC. A moment
 //! with a time zone and one without are incomparable. `now` is not supported, because conclusions from it would

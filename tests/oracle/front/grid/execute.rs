@@ -90,8 +90,8 @@ impl Happening {
     }
 
     fn interferes(&self, other: &Self) -> bool {
-        // Two happenings interfere if one writes what the other reads, or if both write a number or fact in
-        // different ways. Two increases commute.
+        // Two happenings interfere if one writes what the other reads, adds a fact that the other deletes, or
+        // assigns a number that the other writes. Two increases commute.
         let disturbs = |writer: &Self, reader: &Self| {
             (writer.adds | writer.deletes) & reader.reads.0 != 0
                 || writer.adds & reader.deletes != 0

@@ -12,7 +12,7 @@ const CHANGES: &str = "(:derived (unset ?f - function) (not (exists (?d - functi
       :effect (and (not (at_work ?old ?f)) (at_work ?new ?f) (increase (total-cost) (change ?new))))\n";
 
 impl Robot {
-    /// In the renamed form, functions and designs get the prefix `k`, which the name map removes.
+    /// In the renamed form, functions and designs get the prefix `k`. The name map removes it, and maps `kd0` to `prime`.
     pub(super) fn document(
         form: Form,
         functions: usize,

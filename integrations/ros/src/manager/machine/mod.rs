@@ -293,7 +293,7 @@ impl Machine {
                 {
                     return;
                 }
-                // Another client has already set the mode while this program was not running.
+                // The mode was already set while this program was not running.
                 if self.deferred.is_some() && self.modes.get(&function) == Some(&mode) {
                     self.acknowledge(effect.number);
                     return;
