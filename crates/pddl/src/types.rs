@@ -101,12 +101,12 @@ impl TypeHierarchy {
         below_left.iter().zip(&below_right).any(|(left, right)| *left && *right)
     }
 
-    /// Returns `true` if a type is its own supertype through at least one other type. `object` counts as
-    /// acyclic.
+    /// Returns `true` if a type is its own supertype through at least one other type. A supertype of `object`, to which
+    /// every object belongs, would be one of its subtypes, too.
     pub(crate) fn is_cyclic(&self, name: &Name) -> bool {
         let Some(index) = self.index.get(name) else { return false };
-        *index != 0
-            && self.parents[*index].iter().any(|parent| *parent != *index && self.reaches(*parent, *index))
+        let mut supertypes = self.parents[*index].iter().filter(|parent| *parent != index);
+        supertypes.any(|parent| *index == 0 || self.reaches(*parent, *index))
     }
 }
 

@@ -301,6 +301,13 @@ says!(cyclic_types, "place - object dock" => "place - dock dock", @r"
     3 │   (:types place - dock dock - place tool)
       │                        ^^^^
 ");
+says!(a_type_above_object, "dock - place tool" => "dock - place object - dock tool", @r"
+    error[P128]: the type `object` is a subtype of itself
+      ┌─ domain.pddl:3:40
+      │
+    3 │   (:types place - object dock - place object - dock tool)
+      │                                       ^^^^^^
+");
 says!(negative_cycle, "(:action move" => "(:derived (has ?t - tool) (not (has ?t))) (:action move", @r"
     error[P130]: the derived predicate `has` depends on its own negation
       ┌─ domain.pddl:6:14

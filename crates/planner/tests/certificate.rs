@@ -285,3 +285,30 @@ fn an_smt_solver_accepts_true_claims_and_rejects_false_claims() {
 fn many_changed_arguments_prove_nothing_that_is_false() {
     (1_000..2_000).for_each(|seed| withstands(seed, 100));
 }
+
+/// Whether plans are measured by time follows from the domain: a witness may contain atoms that no plan reaches, such as
+/// those with which two actions enable each other.
+#[test]
+fn the_measure_of_plans_does_not_depend_on_the_witness() {
+    let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (p) (q) (r) (s))
+      (:durative-action never :parameters () :duration (= ?duration 1)
+        :condition (at start (q)) :effect (at end (r)))
+      (:action first :parameters () :precondition (s) :effect (q))
+      (:action second :parameters () :precondition (q) :effect (s))
+      (:action do :parameters () :effect (p)))";
+    let problem = "(define (problem x) (:domain d) (:init) (:goal (p)))";
+    let files = read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let files = (files.0, files.1);
+    let task = ground(&files.0, &files.1, &GroundConfig::default()).expect("a task");
+    let solution = optimize(&task, &Config::default(), &mut |_| {});
+    assert_eq!(solution.plan.as_ref().map(|plan| plan.cost.to_string()), Some("0".into()));
+    let certificate = certify(&task, &solution, &Limits::none()).expect("a certificate");
+    let honest = witness(&files.0, &files.1, &certificate.task, &|| false).expect("a witness");
+    let mut larger: Value = serde_json::from_str(&honest).expect("JSON");
+    let atoms = larger["atoms"].as_array_mut().expect("a list");
+    atoms.extend(["(q)", "(r)", "(s)"].map(Value::from));
+    for witness in [honest, larger.to_string()] {
+        let answer = faithful(&files.0, &files.1, &certificate.task, &witness, &|| false);
+        assert!(!matches!(answer, Faithful::Yes { timed: false, .. }), "{answer:?}\n{witness}");
+    }
+}

@@ -269,7 +269,8 @@ impl<'f> Files<'f> {
         }
         let axioms = derived::axioms(&self.world, &invariant, &self.names.linked, self.stop)?;
         let task = Translation::new(&self.world, self.model, &self.names, &invariant, &axioms)?;
-        let timed = self.world.problem.metric.is_none() && self.takes_time(&invariant, &axioms)?;
+        // Decided by the domain alone: the witness may contain atoms that no plan reaches.
+        let timed = self.world.problem.metric.is_none() && self.domain.actions.iter().any(is_durative);
         let unit = self.unit(&invariant, &axioms)?;
         let comparison = Comparison::new(&task, timed, unit)?;
         comparison.initial()?;
@@ -307,19 +308,10 @@ impl<'f> Files<'f> {
         }
         Ok(self.world.timeline.unit(durations.iter()))
     }
+}
 
-    fn takes_time(&self, invariant: &Invariant, axioms: &Axioms) -> Result<bool> {
-        for instance in &self.instances {
-            if matches!(self.domain.actions[instance.action].body, ActionBody::Durative { .. }) {
-                let cases = self.cases(instance, invariant, axioms)?;
-                if cases.iter().any(|case| case.length.as_ref().is_some_and(|length| !length.least.is_zero()))
-                {
-                    return Ok(true);
-                }
-            }
-        }
-        Ok(false)
-    }
+fn is_durative(action: &Action) -> bool {
+    matches!(action.body, ActionBody::Durative { .. })
 }
 
 /// Returns `true` if the effects of an action are unconditional and do not change numbers.

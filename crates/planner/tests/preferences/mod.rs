@@ -238,3 +238,23 @@ fn a_comparison_with_too_many_cases_is_refused_at_once() {
     let errors = ground(&domain, &problem, &GroundConfig::default()).expect_err("there are too many cases");
     assert!(errors.iter().all(|error| error.to_string().contains("many functions")), "{errors:?}");
 }
+
+/// The inner variable hides the parameter, so the condition of the effect and its atom concern different objects.
+#[test]
+fn a_hidden_parameter_keeps_its_value_in_a_constraint() {
+    let domain = "(define (domain d) (:types a b) (:predicates (ready) (p ?x - a) (q ?x - b))
+      (:action go :parameters (?x - a) :precondition (ready)
+        :effect (and (not (ready)) (when (p ?x) (forall (?x - b) (q ?x))))))";
+    let problem =
+        "(define (problem p) (:domain d) (:objects a1 - a c - b) (:init (ready) (p a1)) (:goal (q c))
+      (:constraints (sometime (q c))))";
+    let (parsed, instance, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let plan = PlanText::parse(&Source::new("plan", "(go a1)")).expect("a plan");
+    let verdict = validate(&parsed, &instance, &plan, &Options::default());
+    assert!(verdict.valid, "{verdict:?}");
+    for engine in [Engine::Auto, Engine::Sat] {
+        let solution = solve(domain, problem, engine, Duration::from_secs(60)).expect("few cases");
+        assert_eq!((solution.status, solution.plan.map(|plan| plan.steps.len())), (Status::Optimal, Some(1)));
+    }
+}

@@ -106,7 +106,7 @@ pub(super) fn instance(condition: &Condition, binding: &mut Binding, fresh: &mut
     }
 }
 
-fn atom_instance(atom: &Atom, binding: &Binding) -> Atom {
+pub(super) fn atom_instance(atom: &Atom, binding: &Binding) -> Atom {
     let arguments = atom.arguments.iter().map(|argument| term(argument, binding)).collect();
     Atom { arguments, ..atom.clone() }
 }
@@ -117,7 +117,7 @@ pub(super) fn term(written: &Term, binding: &Binding) -> Term {
     bound.map_or_else(|| written.clone(), |(_, term)| term.clone())
 }
 
-fn expression(written: &Expression, binding: &Binding) -> Expression {
+pub(super) fn expression(written: &Expression, binding: &Binding) -> Expression {
     match written {
         Expression::Fluent(atom) => Expression::Fluent(atom_instance(atom, binding)),
         Expression::Operation(operation, operands, span) => {

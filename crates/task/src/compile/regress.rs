@@ -6,7 +6,8 @@ use pddl::ast::{
     Term, TypedName,
 };
 
-use super::simplify::{all, any, equal, exists, falsity, is_false, not};
+use super::instances::{Binding, atom_instance, expression, instance};
+use super::simplify::{all, any, equal, exists, falsity, identifier, is_false, not};
 
 const MAX_CASES: usize = 64;
 
@@ -31,19 +32,20 @@ const TOO_MANY_CASES: NotRegressable =
 
 impl Happening {
     pub(super) fn of(action: &Action, time: EffectTime) -> Self {
-        let mut changes = Vec::new();
+        let mut flattening =
+            Flattening { scope: &action.parameters, renaming: Vec::new(), changes: Vec::new() };
         match &action.body {
             ActionBody::Instantaneous { effect, .. } if time == EffectTime::AtStart => {
-                flatten(effect, &[], &[], &mut changes);
+                flattening.add(effect, &[], &[]);
             }
             ActionBody::Instantaneous { .. } => {}
             ActionBody::Durative { effects, .. } => {
                 for (_, effect) in effects.iter().filter(|(at, _)| *at == time) {
-                    flatten(effect, &[], &[], &mut changes);
+                    flattening.add(effect, &[], &[]);
                 }
             }
         }
-        Self { changes }
+        Self { changes: flattening.changes }
     }
 
     pub(super) fn changes_function(&self, name: &Name) -> bool {
@@ -205,24 +207,61 @@ impl Change {
     }
 }
 
-fn flatten(effect: &Effect, bound: &[TypedName], conditions: &[Condition], out: &mut Vec<Change>) {
-    match effect {
-        Effect::And(parts) => {
-            for part in parts {
-                flatten(part, bound, conditions, out);
+/// Splits effects into single changes.
+struct Flattening<'a> {
+    /// Parameters of the action.
+    scope: &'a [TypedName],
+    /// New names of variables that hide others. They are in force until the end of their quantifier.
+    renaming: Binding,
+    changes: Vec<Change>,
+}
+
+impl Flattening<'_> {
+    /// Adds the changes of an effect inside of quantifiers over `bound` and of `conditions`.
+    #[expect(clippy::arithmetic_side_effects, reason = "the number of changes fits into memory")]
+    fn add(&mut self, effect: &Effect, bound: &[TypedName], conditions: &[Condition]) {
+        // Conditions have been renamed already. Their quantified variables are not captured, whatever their names.
+        let mut unused = u64::MAX / 2;
+        match effect {
+            Effect::And(parts) => parts.iter().for_each(|part| self.add(part, bound, conditions)),
+            Effect::ForAll(variables, body) => {
+                let depth = self.renaming.len();
+                let mut inner = bound.to_vec();
+                for variable in variables {
+                    let name = &variable.identifier.name;
+                    let is_hiding = |outer: &TypedName| outer.identifier.name == *name;
+                    let mut variable = variable.clone();
+                    if inner.iter().chain(self.scope).any(is_hiding) {
+                        let new =
+                            identifier(&format!("{name} of change {}.{}", self.changes.len(), inner.len()));
+                        let old = std::mem::replace(&mut variable.identifier, new.clone());
+                        self.renaming.push((old.name, Term::Variable(new)));
+                    }
+                    inner.push(variable);
+                }
+                self.add(body, &inner, conditions);
+                self.renaming.truncate(depth);
             }
-        }
-        Effect::ForAll(variables, body) => {
-            let bound: Vec<_> = bound.iter().chain(variables).cloned().collect();
-            flatten(body, &bound, conditions, out);
-        }
-        Effect::When(condition, body) => {
-            let conditions: Vec<_> = conditions.iter().chain([condition]).cloned().collect();
-            flatten(body, bound, &conditions, out);
-        }
-        Effect::Add(_) | Effect::Delete(_) | Effect::Assign(..) => {
-            let (bound, conditions) = (bound.to_vec(), conditions.to_vec());
-            out.push(Change { bound, conditions, effect: effect.clone() });
+            Effect::When(condition, body) => {
+                let condition = match self.renaming[..] {
+                    [] => condition.clone(),
+                    _ => instance(condition, &mut self.renaming, &mut unused),
+                };
+                let conditions: Vec<_> = conditions.iter().cloned().chain([condition]).collect();
+                self.add(body, bound, &conditions);
+            }
+            Effect::Add(_) | Effect::Delete(_) | Effect::Assign(..) => {
+                let effect = match effect {
+                    Effect::Add(atom) => Effect::Add(atom_instance(atom, &self.renaming)),
+                    Effect::Delete(atom) => Effect::Delete(atom_instance(atom, &self.renaming)),
+                    Effect::Assign(kind, target, value, span) => {
+                        let target = atom_instance(target, &self.renaming);
+                        Effect::Assign(*kind, target, expression(value, &self.renaming), *span)
+                    }
+                    other => other.clone(),
+                };
+                self.changes.push(Change { bound: bound.to_vec(), conditions: conditions.to_vec(), effect });
+            }
         }
     }
 }

@@ -4,7 +4,7 @@
 //! becomes a constant offset plus a sum of operator costs. The other fluents remain in the objective, and
 //! their final values are added to the cost of a plan at its end. A planner that minimises operator costs
 //! alone does not minimise such a metric. A metric to be maximised is negated. Without a metric, the cost is
-//! the total duration if an operator of the task has a duration, and the number of actions otherwise.
+//! the total duration if the domain has a durative action, and the number of actions otherwise.
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 
@@ -32,7 +32,8 @@ use pddl::ast::Direction;
 pub fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Result<(), Errors> {
     let lifted = task.world.lifted;
     if lifted.metrics.is_empty() {
-        let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
+        let temporal =
+            lifted.schemas.iter().any(|schema| schema.duration.is_some() || schema.joint.is_some());
         for operator in &mut task.operators {
             // A wait is not an action of the plan and has no cost.
             let unit = Quantity::constant(Rational::from_integer(i128::from(operator.wait.is_none())));
