@@ -59,6 +59,13 @@ impl Interrupt {
     }
 }
 
+impl Interrupt {
+    /// Calls the function. Returns `true` if evaluation has to stop.
+    pub fn is_over(&self) -> bool {
+        (self.0)()
+    }
+}
+
 impl fmt::Debug for Interrupt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Interrupt")
@@ -134,7 +141,7 @@ impl Budget {
             return self.stopped.get().is_none();
         }
         self.rows_until_check.set(ROWS_PER_INTERRUPT_CHECK);
-        if self.limits.interrupt.as_ref().is_some_and(|interrupt| (interrupt.0)()) {
+        if self.limits.interrupt.as_ref().is_some_and(Interrupt::is_over) {
             self.stop(Stop::Interrupted, rule);
         }
         self.stopped.get().is_none()
