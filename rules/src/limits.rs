@@ -57,9 +57,7 @@ impl Interrupt {
     pub fn new(is_over: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Self(Arc::new(is_over))
     }
-}
 
-impl Interrupt {
     /// Calls the function. Returns `true` if evaluation has to stop.
     pub fn is_over(&self) -> bool {
         (self.0)()
