@@ -309,3 +309,28 @@ fn the_schema_is_the_hierarchy_of_classes_and_properties() {
     ];
     assert_eq!(shown, expected);
 }
+
+#[test]
+fn assumed_intersections_of_unions_do_not_multiply_without_limit() {
+    let declared: String = (0..20).map(|i| format!(":L{i} a owl:Class . :R{i} a owl:Class .\n")).collect();
+    let unions: String = (0..20).map(|i| format!("[ a owl:Class ; owl:unionOf ( :L{i} :R{i} ) ] ")).collect();
+    let conclusion = |last: &str| {
+        format!("{declared}[ a owl:Class ; owl:intersectionOf ( {unions} {last} ) ] rdfs:subClassOf :B .")
+    };
+    let premise = format!("{declared}:A rdfs:subClassOf :B .");
+    assert!(follows(&premise, &conclusion(":A")));
+    assert!(!follows(&premise, &conclusion(":C")));
+    // The cases of a small union are still complete.
+    let premise = format!("{declared}:L0 rdfs:subClassOf :B . :R0 rdfs:subClassOf :B .");
+    assert!(follows(&premise, &conclusion(":C")));
+}
+
+#[test]
+fn queries_can_be_interrupted() {
+    let mut engine = engine(":a :p :b . :b :q :c .");
+    let query = read("_:x :p _:y . _:y :q _:z .");
+    assert_eq!(entailments(&engine, &query).map(|results| results.len()), Ok(1));
+    let interrupt = Some(rules::Interrupt::new(|| true));
+    engine.set_limits(rules::Limits { interrupt, ..rules::Limits::default() });
+    assert_eq!(entailments(&engine, &query).map_err(|error| error.code()), Err("R304"));
+}

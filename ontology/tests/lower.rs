@@ -574,3 +574,29 @@ fn datatypes_of_the_ontology_are_tests_in_rule_files() {
         assert_eq!(values, expected, "{rule}");
     }
 }
+
+#[test]
+fn axioms_with_more_variables_than_a_rule_can_have_are_reported() {
+    let text = format!("{PREFIXES}:a :p :b . :b :q :c .");
+    let mut ontology = read_text(&text, "t", &ReadOptions::default()).expect("well-formed");
+    let property =
+        |name: &str| ontology::ObjectPropertyExpression::Property(format!("http://e/#{name}").into());
+    // The first property has the variables 0 and 1, and the last one the variables 65,535 and 65,536.
+    let chain = (0..65_536).map(|position| property(if position == 65_535 { "q" } else { "p" })).collect();
+    let axiom = ontology::Axiom::SubPropertyChainOf(chain, property("r"));
+    ontology.axioms.push(ontology::AnnotatedAxiom { axiom, annotations: Vec::new() });
+    let mut symbols = Symbols::new();
+    let lowered = lower(&ontology, &mut symbols);
+    let warned =
+        |warning: &Warning| warning.code() == "O301" && warning.to_string().contains("65,536 variables");
+    assert!(lowered.warnings.iter().any(warned), "{:?}", lowered.warnings.len());
+    let r = symbols.name("http://e/#r");
+    let concludes = |rule: &rules::Rule| {
+        rule.body.len() > 1000
+            && rule
+                .head
+                .iter()
+                .any(|atom| matches!(atom, rules::Atom::Relation { predicate, .. } if *predicate == r))
+    };
+    assert!(!lowered.program.rules.iter().any(concludes));
+}

@@ -104,6 +104,14 @@ fn a_string_status_instead_of_a_boolean_is_reported() {
     let reported = warnings(&read_text(model, "model.ttl", &ReadOptions::default()).expect("well-formed"));
     let [warning] = &reported[..] else { panic!("{reported:?}") };
     assert!(warning.contains("\"FALSE\"") && warning.contains("a boolean is expected"), "{warning}");
+    for (range, count) in
+        [("xsd:token", 0), ("xsd:anyURI", 0), ("xsd:dateTime", 0), ("t:custom", 0), ("xsd:byte", 1)]
+    {
+        let model = format!("{} t:custom a rdfs:Datatype .", model.replace("xsd:boolean", range));
+        let reported =
+            warnings(&read_text(&model, "model.ttl", &ReadOptions::default()).expect("well-formed"));
+        assert_eq!(reported.len(), count, "{range}: {reported:?}");
+    }
 }
 
 #[test]

@@ -610,3 +610,25 @@ fn annotation_properties_have_no_logical_axioms() {
         assert!(ontology.warnings.iter().any(warned), "{text}: {:?}", ontology.warnings);
     }
 }
+
+#[test]
+fn rules_with_a_restriction_of_an_annotation_property_are_reported() {
+    let head = "@prefix : <http://e.org/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
+        @prefix swrl: <http://www.w3.org/2003/11/swrl#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> . \
+        <http://e.org/> a owl:Ontology . :n a owl:AnnotationProperty . :C a owl:Class . :D a owl:Class . \
+        :x a swrl:Variable .\n";
+    let restriction = "[ a owl:Restriction ; owl:onProperty :n ; owl:allValuesFrom xsd:string ]";
+    let atom =
+        |class: &str| format!("[ a swrl:ClassAtom ; swrl:classPredicate {class} ; swrl:argument1 :x ]");
+    let (plain, annotative) = (atom(":C"), atom(restriction));
+    for (body, conclusion) in [(&annotative, &plain), (&plain, &annotative)] {
+        for rule in [":rule a swrl:Imp", "[] a swrl:Imp"] {
+            let text = format!("{head}{rule} ; swrl:body ( {plain} {body} ) ; swrl:head ( {conclusion} ) .");
+            let ontology = read_text(&text, "text.ttl", &ReadOptions::default());
+            let ontology = ontology.unwrap_or_else(|errors| panic!("{errors}\n{text}"));
+            assert!(ontology.rules.is_empty(), "{text}: {:?}", ontology.rules);
+            let warned = |warning: &Warning| warning.to_string().contains("a rule with a restriction");
+            assert!(ontology.warnings.iter().any(warned), "{text}: {:?}", ontology.warnings);
+        }
+    }
+}

@@ -82,8 +82,8 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "R301",
-        "The evaluation of rules does not terminate.",
-        "The step budget is exhausted. Usually a rule computes new values from its own conclusions, for example with `swrlb:add` in a recursion.",
+        "The step budget of the rules is exhausted.",
+        "The rules have too many matches, or do not terminate. Usually a rule computes new values from its own conclusions, for example with `swrlb:add` in a recursion.",
         "Bound the recursion by a condition. The message names the rule and its last new value. `reason --step-limit` sets the budget.",
     ],
     [

@@ -57,6 +57,11 @@ impl Interrupt {
     pub fn new(is_over: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Self(Arc::new(is_over))
     }
+
+    /// Calls the function. Returns `true` if evaluation has to stop.
+    pub fn is_over(&self) -> bool {
+        (self.0)()
+    }
 }
 
 impl fmt::Debug for Interrupt {
@@ -134,7 +139,7 @@ impl Budget {
             return self.stopped.get().is_none();
         }
         self.rows_until_check.set(ROWS_PER_INTERRUPT_CHECK);
-        if self.limits.interrupt.as_ref().is_some_and(|interrupt| (interrupt.0)()) {
+        if self.limits.interrupt.as_ref().is_some_and(Interrupt::is_over) {
             self.stop(Stop::Interrupted, rule);
         }
         self.stopped.get().is_none()

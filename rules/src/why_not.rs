@@ -176,7 +176,7 @@ impl Engine {
 
     fn near_miss(&self, lowered: &Lowered, bound: Vec<Option<Symbol>>) -> Option<NearMiss> {
         let mut search = Search { engine: self, lowered, visited: 0, best: None };
-        search.visit(State { bound, open_conditions: (0..lowered.body.len()).collect(), ..State::default() });
+        search.run(State { bound, open_conditions: (0..lowered.body.len()).collect(), ..State::default() });
         let best = search.best?;
         let rule = &self.program.rules[lowered.rule];
         let variables = (0..rule.variable_count()).map(|number| Variable(number as u16));
@@ -215,23 +215,70 @@ struct Search<'a> {
     best: Option<State>,
 }
 
-impl Search<'_> {
-    fn visit(&mut self, mut state: State) {
-        self.visited += 1;
-        let cannot_improve = self.best.as_ref().is_some_and(|best| !state.is_better_than(best));
-        if cannot_improve || self.is_over() {
-            return;
+/// The alternatives for a relation atom: each remaining row, and finally the missing fact.
+struct Branch<'a> {
+    state: State,
+    predicate: Symbol,
+    sources: &'a [Source],
+    arguments: Vec<Option<Symbol>>,
+    rows: std::vec::IntoIter<&'a [Symbol]>,
+}
+
+impl Branch<'_> {
+    fn next_match(&mut self) -> Option<State> {
+        for row in self.rows.by_ref() {
+            let mut extended = self.state.clone();
+            if unify(self.sources, row, &mut extended.bound) {
+                extended.supports.push(Fact::new(self.predicate, row.iter().copied()));
+                return Some(extended);
+            }
         }
-        let Some(at) = self.next(&state) else {
-            self.best = Some(state);
-            return;
-        };
-        let position = state.open_conditions.remove(at);
-        match &self.lowered.body[position] {
-            Condition::Relation(relation, sources) => self.branch(&state, *relation, sources),
-            other => {
-                self.test(other, &mut state);
-                self.visit(state);
+        None
+    }
+
+    fn unmatched(mut self) -> State {
+        let (predicate, arguments) = (self.predicate, self.arguments);
+        self.state.obstacles.push(Obstacle::Missing { predicate, arguments });
+        self.state
+    }
+}
+
+impl<'a> Search<'a> {
+    /// Searches depth-first. The stack is explicit, because a body can have tens of thousands of atoms.
+    fn run(&mut self, start: State) {
+        let mut branches: Vec<Branch<'a>> = self.visit(start).into_iter().collect();
+        while let Some(mut branch) = branches.pop() {
+            if self.is_over() {
+                return;
+            }
+            let state = match branch.next_match() {
+                Some(state) => {
+                    branches.push(branch);
+                    state
+                }
+                None => branch.unmatched(),
+            };
+            branches.extend(self.visit(state));
+        }
+    }
+
+    /// Evaluates conditions up to the next relation atom and returns its alternatives. Returns `None` if there are no
+    /// further conditions, or if the state cannot improve on the best one.
+    fn visit(&mut self, mut state: State) -> Option<Branch<'a>> {
+        loop {
+            self.visited += 1;
+            let cannot_improve = self.best.as_ref().is_some_and(|best| !state.is_better_than(best));
+            if cannot_improve || self.is_over() {
+                return None;
+            }
+            let Some(at) = self.next(&state) else {
+                self.best = Some(state);
+                return None;
+            };
+            let position = state.open_conditions.remove(at);
+            match &self.lowered.body[position] {
+                Condition::Relation(relation, sources) => return self.branch(state, *relation, sources),
+                other => self.test(other, &mut state),
             }
         }
     }
@@ -268,26 +315,14 @@ impl Search<'_> {
         (0..state.open_conditions.len()).rev().max_by_key(|&at| score(state.open_conditions[at]))
     }
 
-    fn branch(&mut self, state: &State, relation: RelationId, sources: &[Source]) {
-        let Some(predicate) = self.engine.store.get(relation).predicate else { return };
+    fn branch(&self, state: State, relation: RelationId, sources: &'a [Source]) -> Option<Branch<'a>> {
+        let predicate = self.engine.store.get(relation).predicate?;
         let arguments: Vec<Option<Symbol>> =
             sources.iter().map(|&source| value(source, &state.bound)).collect();
         let mut rows: Vec<&[Symbol]> = self.engine.matching_rows(predicate, &arguments).collect();
         // A fixed order makes the explanation reproducible.
         rows.sort_unstable();
-        for row in rows {
-            if self.is_over() {
-                break;
-            }
-            let mut extended = state.clone();
-            if unify(sources, row, &mut extended.bound) {
-                extended.supports.push(Fact::new(predicate, row.iter().copied()));
-                self.visit(extended);
-            }
-        }
-        let mut unmatched = state.clone();
-        unmatched.obstacles.push(Obstacle::Missing { predicate, arguments });
-        self.visit(unmatched);
+        Some(Branch { state, predicate, sources, arguments, rows: rows.into_iter() })
     }
 
     fn test(&self, condition: &Condition, state: &mut State) {

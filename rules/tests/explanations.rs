@@ -51,3 +51,16 @@ fn derivations_print_as_trees() {
 ";
     assert_eq!(displayed, expected);
 }
+
+/// The search visits each atom of the body below the previous one, so recursion would exhaust the stack.
+#[test]
+fn the_search_for_a_nearest_match_does_not_recurse() {
+    let atoms: Vec<String> = (0..300).map(|number| format!("p(?x, ?y{number})")).collect();
+    let rules = format!("[long] {} ^ missing(?x) -> q(?x) .", atoms.join(" ^ "));
+    let mut engine = engine(&rules, "p(a, b)").expect("rules");
+    let fact = fact(&mut engine, "q(a)");
+    let thread = std::thread::Builder::new().stack_size(128 << 10).spawn(move || engine.why_not(&fact));
+    let misses = thread.expect("a thread").join().expect("misses");
+    let [miss] = &misses[..] else { panic!("{} misses", misses.len()) };
+    assert_eq!((miss.supports.len(), miss.obstacles.len()), (300, 1));
+}

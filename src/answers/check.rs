@@ -93,7 +93,7 @@ enum Found {
 /// `upper` are null. `exact` is a fraction, `inf`, or null.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ValuePart {
-    /// `finite`, `infinite`, or `undefined` (no policy satisfies the bound of `multi`).
+    /// `finite`, `infinite`, or `undefined` (no policy within the bound of `multi` was found).
     status: &'static str,
     /// The value; null if it is infinite or undefined.
     value: Option<f64>,

@@ -21,7 +21,11 @@ pub fn as_text(report: &Report, verbose: bool) -> String {
             output::table(&["first", "second"], rows)
         }
         Outcome::Constrained { randomised, deterministic, proved } => {
-            let note = if *proved { "" } else { " (perhaps not the least)" };
+            let note = match randomised {
+                _ if *proved => "",
+                Answer::Undefined => " (not proved; use `--exact`)",
+                _ => " (perhaps not the least)",
+            };
             format!("randomised: {}\ndeterministic: {}{note}\n", shown(randomised), shown(deterministic))
         }
     };
@@ -63,7 +67,7 @@ fn states_text(variables: &[(String, bool)], states: &[Listed]) -> String {
 pub fn shown(answer: &Answer) -> String {
     match answer {
         Answer::Infinite => "infinite".to_owned(),
-        Answer::Undefined => "undefined: no policy does this".to_owned(),
+        Answer::Undefined => "undefined: no policy within the bound was found".to_owned(),
         Answer::Finite(quantity) => match &quantity.exact {
             Some(exact) if exact.is_integer() => exact.to_string(),
             Some(exact) if exact.denom().bits() + exact.numer().bits() <= 128 => {

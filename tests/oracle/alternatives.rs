@@ -138,6 +138,19 @@ impl Task {
         }
     }
 
+    /// Returns the cost of a plan; `None` if it is not applicable or does not reach the goal.
+    fn cost(&self, plan: &[usize]) -> Option<u32> {
+        let (mut state, mut cost) = (self.initial, 0);
+        for number in plan {
+            let action = &self.actions[*number];
+            if !action.is_applicable(state) {
+                return None;
+            }
+            (state, cost) = (action.apply(state), cost + action.cost);
+        }
+        holds(self.goal, state).then_some(cost)
+    }
+
     /// Returns the plans with at most [`LENGTH`] steps that cost exactly `cost`.
     fn plans(&self, actions: &BTreeSet<usize>, cost: u32) -> Vec<Vec<usize>> {
         let (mut plans, mut open) = (Vec::new(), vec![(self.initial, 0, Vec::new())]);
@@ -159,7 +172,7 @@ impl Task {
     }
 }
 
-/// Compares the reported alternatives with the enumeration. Returns `true` if the report claims to
+/// Executes the reported alternatives and compares them with the enumeration. Returns `true` if the report claims to
 /// be complete, and `None` without an optimal plan or a report.
 fn check(seed: u64) -> Option<bool> {
     let task = Task::new(seed);
@@ -186,6 +199,9 @@ fn check(seed: u64) -> Option<bool> {
     let (first, cost) = (numbers(plan), plan.cost.to_string().parse().expect("a small number"));
     let reported: BTreeSet<Vec<usize>> = report.plans.iter().map(numbers).chain([first.clone()]).collect();
     let cheapest = task.plans(&task.active(), cost);
+    for plan_steps in &reported {
+        assert_eq!(task.cost(plan_steps), Some(cost), "{plan_steps:?}\n{}", about());
+    }
     // A complete report must contain every enumerated plan, and every enumerated plan must agree with each
     // step that is reported as forced.
     for plan_steps in &cheapest {
@@ -206,7 +222,7 @@ fn check(seed: u64) -> Option<bool> {
 }
 
 #[test]
-fn enumerated_cheapest_plans_are_in_complete_reports() {
+fn reported_plans_are_cheapest_and_complete_reports_have_all() {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 500));
     let complete = (from..from + tasks).filter(|seed| check(*seed) == Some(true)).count();
     assert!(complete as u64 * 5 > tasks, "all cheapest plans of {complete} tasks are known");

@@ -18,7 +18,9 @@ use num_rational::BigRational;
 use pddl::ast::Problem;
 use pddl::validate::ViolationKind;
 
-use crate::judge::{Case, Mode, SHORT, Tally, Truth, judge, plan_lines, project_verdict, read, setting};
+use crate::judge::{
+    Case, Mode, SHORT, Tally, Truth, is_over, judge, plan_lines, project_verdict, read, setting,
+};
 use crate::temporal::best::{Schedule, written};
 use crate::temporal::happening::{Obstacle, World};
 use crate::temporal::model::{Body, Q, big, q};
@@ -215,7 +217,12 @@ fn check(name: &str, seed: u64, unit: Option<Q>, tally: &mut Tally) {
 fn enumerate(name: &str, default: u64, unit: impl Fn(u64) -> Option<Q>) {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default));
     let mut tally = Tally::default();
-    (from..from + tasks).for_each(|seed| check(name, seed, unit(seed), &mut tally));
+    for seed in from..from + tasks {
+        check(name, seed, unit(seed), &mut tally);
+        if is_over(&tally) {
+            break;
+        }
+    }
     tally.finish();
 }
 

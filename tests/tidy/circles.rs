@@ -1,6 +1,6 @@
 //! Test that the modules of a crate do not import from each other in a cycle.
 //!
-//! A file imports from a module if one of its paths (`use` or inline, but not in arguments of macros) refers to this
+//! A file imports from a module if one of its paths (`use` or inline, also in arguments of macros) refers to this
 //! module. Modules and functions for tests are ignored, because tests can import from any module.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -8,6 +8,7 @@ use std::path::Path;
 
 use petgraph::algo::tarjan_scc;
 use petgraph::graphmap::DiGraphMap;
+use syn::buffer::{Cursor, TokenBuffer};
 use syn::visit::{self, Visit};
 
 const CRATES: [&str; 15] = [
@@ -79,6 +80,47 @@ impl Paths<'_> {
         }
     }
 
+    /// Adds the paths in the arguments of a macro, which are not parsed.
+    fn tokens(&mut self, mut cursor: Cursor) {
+        let (mut segments, mut colons) = (Vec::<String>::new(), 0);
+        while !cursor.eof() {
+            let name = cursor.ident();
+            // After a leading `::`, the path refers to another crate.
+            let continues = if name.is_some() {
+                colons == 2
+            } else {
+                cursor.punct().is_some_and(|(mark, _)| mark.as_char() == ':')
+            };
+            if !continues {
+                self.add_tokens(&mut segments);
+                colons = 0;
+            }
+            if let Some((name, next)) = name {
+                if continues && segments.is_empty() {
+                    segments.push(String::new());
+                }
+                segments.push(name.to_string());
+                (colons, cursor) = (0, next);
+            } else if let Some((_, next)) = cursor.punct() {
+                colons += usize::from(continues);
+                cursor = next;
+            } else if let Some((inner, _, _, next)) = cursor.any_group() {
+                self.tokens(inner);
+                cursor = next;
+            } else if let Some((_, next)) = cursor.token_tree() {
+                cursor = next;
+            }
+        }
+        self.add_tokens(&mut segments);
+    }
+
+    fn add_tokens(&mut self, segments: &mut Vec<String>) {
+        if segments.len() > 1 && !segments[0].is_empty() {
+            self.add(segments);
+        }
+        segments.clear();
+    }
+
     fn tree(&mut self, tree: &syn::UseTree, prefix: &[String]) {
         let path_to = |name: &syn::Ident| [prefix, &[name.to_string()]].concat();
         match tree {
@@ -140,6 +182,11 @@ impl<'a> Visit<'a> for Paths<'_> {
         if !is_for_tests(&item.attrs) {
             visit::visit_item_fn(self, item);
         }
+    }
+
+    fn visit_macro(&mut self, invocation: &'a syn::Macro) {
+        self.tokens(TokenBuffer::new2(invocation.tokens.clone()).begin());
+        visit::visit_macro(self, invocation);
     }
 
     fn visit_path(&mut self, path: &'a syn::Path) {
@@ -231,6 +278,13 @@ fn import_cycles_are_detected() {
     ];
     assert_eq!(circles(&imports(&files, "x/src")), ["crate::a -> crate::c -> crate::a (a group of 2)"]);
     assert!(circles(&imports(&files[..3], "x/src")).is_empty());
+    for (argument, expected) in
+        [("crate::a::f()", 1), ("\"crate::a\"", 0), ("::a::f()", 0), ("a: super::a::F", 1)]
+    {
+        let code = format!("fn g() {{ assert!(x({argument})); }}");
+        let files = [file("lib.rs", "mod a; mod c;"), file("a.rs", "use crate::c::g;"), file("c.rs", &code)];
+        assert_eq!(circles(&imports(&files, "x/src")).len(), expected, "{argument}");
+    }
     // A re-export of another crate's item is not an import within this crate, but a re-export of an item of
     // this crate is.
     for (root, expected) in [("pub use ::other::c; mod a;", 0), ("pub use a::c; mod a;", 1)] {

@@ -8,9 +8,9 @@ const TABLES: [&str; 10] =
     ["rules", "ontology", "pddl", "task", "probabilistic", "mission", "verify", "src", "ros", "fleet"];
 const LETTERS: &str = "EMNOPQR";
 
-/// Returns the codes in a text before the first `#[cfg(test)]`, except for those in lines of comments.
+/// Returns the codes in a file, except for those in tests and in lines of comments.
 fn codes_in(text: &str) -> BTreeSet<String> {
-    let library_part = text.split("#[cfg(test)]").next().unwrap_or(text);
+    let library_part = super::without_tests(text);
     let lines = library_part.lines().filter(|line| !line.trim_start().starts_with("//"));
     let words = lines.flat_map(|line| line.split(|c: char| !(c.is_alphanumeric() || c == '_')));
     let is_code = |word: &&str| codes::is_code(word) && word.starts_with(|c| LETTERS.contains(c));
@@ -93,7 +93,7 @@ fn entries_of_tables_are_sentences() {
 
 #[test]
 fn codes_are_distinguished_from_other_words() {
-    let text = "// M999\nlet a = \"M101\"; // no\nuse x::I256; error[O102]: R104 <{name}>\n#[cfg(test)]\nmod tests { \"P100\" }";
-    let expected: BTreeSet<String> = ["M101", "O102", "R104"].map(str::to_owned).into();
+    let text = "// M999\nlet a = \"M101\"; // no\nuse x::I256; error[O102]: R104 <{name}>\n#[cfg(test)]\nmod tests { \"P100\" }\n\"P101\"";
+    let expected: BTreeSet<String> = ["M101", "O102", "P101", "R104"].map(str::to_owned).into();
     assert_eq!(codes_in(text), expected);
 }

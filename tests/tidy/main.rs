@@ -85,9 +85,34 @@ fn check(rule: &str, offends: impl Fn(&str, &str) -> Vec<String>) {
     assert!(offenders.is_empty(), "{rule}:\n{}", offenders.join("\n"));
 }
 
-/// Returns the code of a file before the first `#[cfg(test)]`. `None` if the file does not belong to one of the checked
-/// libraries.
-fn library_part<'a>(path: &str, text: &'a str) -> Option<&'a str> {
+/// Returns the code of a formatted file without the items that `#[cfg(test)]` marks.
+fn without_tests(text: &str) -> String {
+    let mut code = String::new();
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        let Some(tail) = line.trim_start().strip_prefix("#[cfg(test)]") else {
+            code += line;
+            code.push('\n');
+            continue;
+        };
+        let indent = &line[..line.len() - line.trim_start().len()];
+        let is_attribute = |line: &str| line.trim().is_empty() || line.trim_start().starts_with('#');
+        let mut item = tail;
+        while is_attribute(item) {
+            let Some(next) = lines.next() else { return code };
+            item = next;
+        }
+        // An item of several lines ends at the brace with the indentation of the attribute.
+        let end = format!("{indent}}}");
+        if !item.ends_with([';', '}', ',']) {
+            lines.by_ref().find(|line| line.starts_with(&end));
+        }
+    }
+    code
+}
+
+/// Returns the code of a file without its tests. `None` if the file does not belong to one of the checked libraries.
+fn library_part(path: &str, text: &str) -> Option<String> {
     let library = [
         "src/",
         "crates/diagnostics/src/",
@@ -107,9 +132,15 @@ fn library_part<'a>(path: &str, text: &'a str) -> Option<&'a str> {
     ]
     .iter()
     .any(|folder| path.starts_with(folder));
-    let code = text.split("#[cfg(test)]").next().unwrap_or(text);
     let is_exempt = path.ends_with("/tests.rs") || path.starts_with("src/cli") || path == "src/main.rs";
-    (library && !is_exempt).then_some(code)
+    (library && !is_exempt).then(|| without_tests(text))
+}
+
+#[test]
+fn only_items_for_tests_are_left_out() {
+    let text = "a();\n#[cfg(test)]\nmod tests;\nb();\n    #[cfg(test)]\n    #[must_use]\n    fn c() {\n        d();\n    }\n\
+                e();\n#[cfg(test)] mod f {\n    g();\n}\nh();\n#[cfg(test)]\nfn i() {}\nj();\n";
+    assert_eq!(without_tests(text), "a();\nb();\ne();\nh();\nj();\n");
 }
 
 #[test]
@@ -147,7 +178,7 @@ fn files_and_functions_are_short() {
 #[test]
 fn libraries_do_not_print() {
     check("a library prints nothing", |path, text| {
-        let code = library_part(path, text).unwrap_or("");
+        let code = library_part(path, text).unwrap_or_default();
         let prints = ["println!", "eprintln!", "print!(", "dbg!("];
         let is_code = |line: &&str| !line.trim_start().starts_with("//");
         let is_used = |print: &&&str| code.lines().filter(is_code).any(|line| line.contains(**print));
@@ -158,7 +189,7 @@ fn libraries_do_not_print() {
 #[test]
 fn panics_state_an_invariant() {
     check("`unwrap` is not used, `expect` states an invariant, in library code", |path, text| {
-        let library_code = library_part(path, text).unwrap_or("");
+        let library_code = library_part(path, text).unwrap_or_default();
         let is_violation = |line: &&str| {
             let is_code = !line.trim_start().starts_with("//");
             is_code

@@ -31,9 +31,7 @@ impl Log {
             @for message in &self.messages { p class="bad" { (message) } }
             h2 { "What happened" }
             (shown("log", &PAGE, &|canvas| self.picture(canvas)))
-            p class="dim" {
-                "A mark can represent several entries that are close together; the list shows each of them."
-            }
+            p class="dim" { "A mark can represent several entries that are close together." }
             h2 { "List" }
             @let listed: Vec<&Happening> = self.listed();
             @if listed.len() < self.happenings.len() {

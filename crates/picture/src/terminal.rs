@@ -73,7 +73,7 @@ impl Plan {
         if let Some(places) = self.to_scale(room) {
             return Some(vec![places.into_iter().enumerate().collect()]);
         }
-        let bands = (count * NARROW).div_ceil(room);
+        let bands = count.div_ceil((room / NARROW).max(1));
         (bands <= BANDS).then(|| {
             let (size, mut band) = (count.div_ceil(bands), Vec::new());
             for first in (0..count).step_by(size) {

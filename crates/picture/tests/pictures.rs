@@ -212,6 +212,17 @@ fn terminals_of_60_to_139_columns_hold_the_picture() {
     assert_eq!(plan(200, "").text(80), None, "more than an overview");
 }
 
+#[test]
+fn bands_are_not_wider_than_the_terminal() {
+    for steps in 1..60 {
+        for columns in 60..100 {
+            let Some(text) = plan(steps, "").text(columns) else { continue };
+            let widest = text.lines().map(|line| line.chars().count()).max();
+            assert!(widest <= Some(columns), "{steps} steps, {columns} columns:\n{text}");
+        }
+    }
+}
+
 /// Returns the drawings that a column of this width shows: name, width, and whether the drawing is
 /// scrolled.
 fn shown(page: &str, column: f64) -> Vec<(String, f64, bool)> {

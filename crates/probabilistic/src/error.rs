@@ -53,7 +53,7 @@ pub enum Error {
         /// transitions instead of too many states.
         limit: usize,
     },
-    /// The caller cancelled the exploration.
+    /// The caller cancelled the exploration or the computation of the values.
     #[error("stopped after {states} states")]
     Interrupted {
         /// Number of reached states.

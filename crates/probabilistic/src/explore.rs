@@ -123,7 +123,7 @@ pub struct Bounds<'a> {
     /// Upper limit on the number of reached states.
     pub states: usize,
     /// Callback that periodically receives the number of reached states; its result `false` cancels the
-    /// exploration.
+    /// exploration or the computation of the values.
     pub progress: &'a dyn Fn(usize) -> bool,
 }
 
@@ -135,7 +135,7 @@ impl<'a> Bounds<'a> {
     }
 
     /// Sets the callback that periodically receives the number of reached states; its result `false` cancels
-    /// the exploration.
+    /// the exploration or the computation of the values.
     #[must_use]
     pub fn with_progress(self, progress: &'a dyn Fn(usize) -> bool) -> Self {
         Self { progress, ..self }

@@ -5,29 +5,34 @@
 //! variables. Formulas are expanded; names of labels and reward structures that collide with other
 //! names get a prefix.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use num_traits::ToPrimitive;
 use serde_json::{Value, json};
 
-use crate::error::{Diagnostic, Error};
+use crate::error::{Diagnostic, Error, Place};
+use crate::prism::TOO_LARGE;
 use crate::prism::ast::{
     BinaryOp, Command, Expr, ExprKind, Function, Model, ModelKind, Module, Named, RewardItem, Rewards, Type,
     Variable,
 };
 
+/// Upper limit on the number of subexpressions of all expressions of a document.
+const MAX_PARTS: usize = 500_000;
+
 /// Translates a PRISM model to JANI. Undefined constants become parameters of the JANI model.
 ///
 /// # Errors
-/// A construct that JANI cannot express (rewards of commands without an action), or a formula whose
-/// definition contains itself.
+/// A construct that JANI cannot express (rewards of commands without an action), a formula whose
+/// definition contains itself, or expressions that are too large after the expansion of formulas.
 pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     let recursive: Vec<Diagnostic> =
         model.formulas.iter().filter_map(|formula| recursion(model, formula)).collect();
     if !recursive.is_empty() {
         return Err(Error::Model(recursive.into()));
     }
-    let writer = Writer { model };
+    let writer = Writer { model, remaining: Cell::new(MAX_PARTS) };
     let mut problems = Vec::new();
     let actions = actions(model);
     let globals = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
@@ -78,6 +83,10 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     });
     if let Some(condition) = &model.initial {
         document["restrict-initial"] = json!({ "exp": writer.expression(condition) });
+    }
+    if writer.remaining.get() == 0 {
+        let place = Place { line: 1, column: 1 };
+        return Err(Error::Model(vec![Diagnostic::new("Q104", place, TOO_LARGE)].into()));
     }
     Ok(document)
 }
@@ -177,6 +186,8 @@ fn parts(condition: &Expr) -> Vec<&Expr> {
 
 struct Writer<'a> {
     model: &'a Model,
+    /// Number of subexpressions that may still be written; at 0, the document is incomplete.
+    remaining: Cell<usize>,
 }
 
 impl Writer<'_> {
@@ -318,6 +329,10 @@ impl Writer<'_> {
     }
 
     fn expression(&self, expression: &Expr) -> Value {
+        self.remaining.set(self.remaining.get().saturating_sub(1));
+        if self.remaining.get() == 0 {
+            return Value::Null;
+        }
         match &expression.kind {
             ExprKind::Bool(value) => json!(value),
             ExprKind::Int(value) => json!(value),
@@ -327,17 +342,17 @@ impl Writer<'_> {
                 Some(formula) => self.expression(&formula.expression),
                 None => json!(name),
             },
-            ExprKind::Not(inner) => json!({ "op": "¬", "exp": self.expression(inner) }),
-            ExprKind::Negative(inner) => json!({ "op": "-", "left": 0, "right": self.expression(inner) }),
+            ExprKind::Not(inner) => object([("op", "¬".into()), ("exp", self.expression(inner))]),
+            ExprKind::Negative(inner) => binary("-", 0.into(), self.expression(inner)),
             ExprKind::Binary(op, left, right) => {
-                json!({ "op": sign(*op), "left": self.expression(left), "right": self.expression(right) })
+                binary(sign(*op), self.expression(left), self.expression(right))
             }
-            ExprKind::If(condition, then, otherwise) => json!({
-                "op": "ite",
-                "if": self.expression(condition),
-                "then": self.expression(then),
-                "else": self.expression(otherwise),
-            }),
+            ExprKind::If(condition, then, otherwise) => object([
+                ("op", "ite".into()),
+                ("if", self.expression(condition)),
+                ("then", self.expression(then)),
+                ("else", self.expression(otherwise)),
+            ]),
             ExprKind::Call(function, arguments) => self.call(*function, arguments),
             // Properties do not occur in models.
             ExprKind::Property(_) | ExprKind::Temporal(_) => json!(true),
@@ -354,12 +369,19 @@ impl Writer<'_> {
             (Function::Mod, [left, right]) => json!({ "op": "%", "left": left, "right": right }),
             _ => {
                 let pairs = values.into_iter();
-                pairs
-                    .reduce(|left, right| json!({ "op": function.name(), "left": left, "right": right }))
-                    .unwrap_or(Value::Null)
+                pairs.reduce(|left, right| binary(function.name(), left, right)).unwrap_or(Value::Null)
             }
         }
     }
+}
+
+/// Creates an object without a copy of the values, which `json!` would make at each level of an expression.
+fn object<const N: usize>(entries: [(&str, Value); N]) -> Value {
+    Value::Object(entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect())
+}
+
+fn binary(op: &str, left: Value, right: Value) -> Value {
+    object([("op", op.into()), ("left", left), ("right", right)])
 }
 
 /// Converts a rational to JANI. A decimal with at most 30 decimal places becomes an exact number

@@ -7,6 +7,7 @@
 //! vertex, or proves that the segment belongs to the front (Forejt, Kwiatkowska and Parker, ATVA 2012). Each
 //! vertex is attained by a policy whose memory is the set of reached targets.
 
+use std::cell::RefCell;
 use std::collections::VecDeque;
 
 use fixedbitset::FixedBitSet;
@@ -14,9 +15,10 @@ use fixedbitset::FixedBitSet;
 use crate::mdp::Mdp;
 use crate::number::Number;
 use crate::policy::{choices_of, conserving};
-use crate::solve::{Direction, NONE, Problem, Solution, solve};
+use crate::solve::work::DEFAULT_BUDGET;
+use crate::solve::{Direction, NONE, Problem, Solution, Work, solve_within};
 
-/// Error: exact arithmetic exceeds its budget.
+/// Error: exact arithmetic exceeds its budget, or the caller has cancelled the computation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Exhausted;
 
@@ -54,6 +56,18 @@ pub struct Constrained<N> {
     pub deterministic: Option<(Bounded<N>, bool)>,
 }
 
+/// The result of minimising the first loss under an upper limit on the second loss.
+#[derive(Debug, Clone)]
+pub enum Optimum<N> {
+    /// Policies within the limit.
+    Found(Constrained<N>),
+    /// No policy with finite losses was found within the limit.
+    Infeasible {
+        /// `true` if no such policy exists. In doubles, the computed losses may be too inaccurate for a proof.
+        proved: bool,
+    },
+}
+
 /// A loss with its bounds. If arithmetic is exact, the bounds are unused.
 #[derive(Debug, Clone)]
 pub struct Bounded<N> {
@@ -82,6 +96,7 @@ pub struct Pareto<'a, N> {
     /// The states in which an expected cost is still to be paid and is infinite under every policy.
     blocked: FixedBitSet,
     has_costs: bool,
+    work: RefCell<Work<'a>>,
 }
 
 impl<'a, N: Number> Pareto<'a, N> {
@@ -90,6 +105,14 @@ impl<'a, N: Number> Pareto<'a, N> {
     /// # Errors
     /// Exact arithmetic exceeds its budget.
     pub fn new(mdp: &'a Mdp<N>, objectives: &'a [Objective<N>; 2]) -> Result<Self, Exhausted> {
+        Self::within(mdp, objectives, Work::new(DEFAULT_BUDGET))
+    }
+
+    pub(crate) fn within(
+        mdp: &'a Mdp<N>,
+        objectives: &'a [Objective<N>; 2],
+        mut work: Work<'a>,
+    ) -> Result<Self, Exhausted> {
         let n = mdp.states();
         let mut terminal = FixedBitSet::with_capacity(n);
         let mut blocked = FixedBitSet::with_capacity(n);
@@ -97,7 +120,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         let has_costs = objectives.iter().any(|objective| objective.rewards.is_some());
         for (number, objective) in objectives.iter().enumerate() {
             terminal.union_with(&objective.target);
-            let solution = solve(problem(mdp, objective), None).ok_or(Exhausted)?;
+            work.refill();
+            let solution = solve_within(problem(mdp, objective), None, &mut work).ok_or(Exhausted)?;
             alone[number] = match objective.rewards {
                 Some(_) => solution.values,
                 None => solution.values.iter().map(|value| N::one().minus(value)).collect(),
@@ -112,7 +136,7 @@ impl<'a, N: Number> Pareto<'a, N> {
             blocked.set(state, pending);
         }
         terminal.difference_with(&blocked);
-        Ok(Self { mdp, objectives, alone, alone_errors, terminal, blocked, has_costs })
+        Ok(Self { mdp, objectives, alone, alone_errors, terminal, blocked, has_costs, work: work.into() })
     }
 
     /// Returns the value of each state as a terminal state, for one objective: its loss from this state on if
@@ -160,7 +184,9 @@ impl<'a, N: Number> Pareto<'a, N> {
             blocked: Some(&self.blocked),
             allowed,
         };
-        let solution = solve(problem, None).ok_or(Exhausted)?;
+        let mut work = self.work.borrow_mut();
+        work.refill();
+        let solution = solve_within(problem, None, &mut work).ok_or(Exhausted)?;
         let optimal_choices = conserving(&problem, &solution);
         Ok((solution, optimal_choices))
     }
@@ -250,19 +276,37 @@ impl<'a, N: Number> Pareto<'a, N> {
         Ok(done)
     }
 
-    /// Minimises the first loss under an upper limit on the second loss. Returns `None` if no policy with finite
-    /// losses satisfies the limit. With more than 2,000 vertices, the values may be above the minimum, also in exact
-    /// arithmetic.
+    /// Minimises the first loss under an upper limit on the second loss. With more than 2,000 vertices, the values
+    /// may be above the minimum, also in exact arithmetic.
     ///
     /// # Errors
     /// Exact arithmetic exceeds its budget.
-    pub fn constrained(&self, limit: &N) -> Result<Option<Constrained<N>>, Exhausted> {
+    pub fn constrained(&self, limit: &N) -> Result<Optimum<N>, Exhausted> {
         let vertices = self.vertices(None)?;
-        let Some((value, segment)) = lower_hull(&vertices, limit) else { return Ok(None) };
+        let Some((value, segment)) = lower_hull(&vertices, limit) else {
+            let proved = vertices.is_empty() || self.is_infeasible(limit, None)?;
+            return Ok(Optimum::Infeasible { proved });
+        };
         let lower = self.below(&vertices, segment, limit, None)?;
         let randomised = Bounded { value, lower, upper: above(&vertices, segment, limit) };
         let deterministic = self.deterministic(limit)?;
-        Ok(Some(Constrained { randomised, deterministic }))
+        Ok(Optimum::Found(Constrained { randomised, deterministic }))
+    }
+
+    /// Returns `true` if the second loss of every policy with the allowed choices is proved to exceed the limit. Call it
+    /// only if no known vertex satisfies the limit; in exact arithmetic this is a proof.
+    fn is_infeasible(&self, limit: &N, allowed: Option<&FixedBitSet>) -> Result<bool, Exhausted> {
+        Ok(N::EXACT || self.least(&[N::zero(), N::one()], allowed)? > kept_limit(limit.to_f64()).next_up())
+    }
+
+    /// Lower bound on the weighted sum of both losses over all policies with the allowed choices.
+    fn least(&self, weights: &[N; 2], allowed: Option<&FixedBitSet>) -> Result<f64, Exhausted> {
+        let (solution, _) = self.solve(weights, allowed)?;
+        let [first, second] = weights.each_ref().map(Number::to_f64);
+        let value = solution.values[0].to_f64();
+        let least = if self.has_costs { value } else { first + second - value };
+        let error = solution.errors[0] + first * self.alone_errors[0] + second * self.alone_errors[1];
+        Ok(least - error - 16.0 * f64::EPSILON * (least.abs() + first + second))
     }
 
     /// Lower bound on the first loss of every randomised policy within the limit. The bound follows from the
@@ -282,25 +326,22 @@ impl<'a, N: Number> Pareto<'a, N> {
             let (a, b) = (&vertices[left].losses, &vertices[right].losses);
             [a[1].minus(&b[1]), b[0].minus(&a[0])]
         });
-        let (solution, _) = self.solve(&weights, allowed)?;
+        let least = self.least(&weights, allowed)?;
         let [first, second] = weights.each_ref().map(Number::to_f64);
-        let value = solution.values[0].to_f64();
-        let least = if self.has_costs { value } else { first + second - value };
-        let error = solution.errors[0] + first * self.alone_errors[0] + second * self.alone_errors[1];
         let spent = second * kept_limit(limit.to_f64());
-        let rounding = 16.0 * f64::EPSILON * (least.abs() + spent + first);
-        Ok(((least - spent - error - rounding) / first).next_down().max(0.0))
+        let rounding = 16.0 * f64::EPSILON * (least.abs() + spent);
+        Ok(((least - spent - rounding) / first).next_down().max(0.0))
     }
 
     /// Searches for the best deterministic policy within the limit, by branch and bound. A node branches over
     /// the choices of a state in which the policies of two neighbouring vertices differ. The lower bound of a
     /// node is the optimum of randomised policies with its allowed choices. Returns the loss of the best policy
-    /// found, and `true` if it is proved optimal; `None` if no policy within the limit was found. The search
-    /// ends after [`MAX_BRANCHES`] nodes.
+    /// found, and `true` if it is proved optimal (in doubles: if the optimum is proved to lie within the bounds);
+    /// `None` if no policy within the limit was found. The search ends after [`MAX_BRANCHES`] nodes.
     fn deterministic(&self, limit: &N) -> Result<Option<(Bounded<N>, bool)>, Exhausted> {
-        let mut best: Option<Bounded<N>> = None;
-        // Lower bound on the first loss in all pruned nodes.
-        let mut lower = f64::INFINITY;
+        let mut best: Option<N> = None;
+        // Bounds on the first loss: the lower bound holds in all pruned nodes.
+        let (mut lower, mut upper) = (f64::INFINITY, f64::INFINITY);
         let mut choices = FixedBitSet::with_capacity(self.mdp.choice_count());
         choices.insert_range(..);
         let mut open = vec![choices];
@@ -309,19 +350,27 @@ impl<'a, N: Number> Pareto<'a, N> {
         let mut is_complete = true;
         while let Some(allowed) = open.pop() {
             if remaining_nodes.next().is_none() {
-                return Ok(best.map(|best| (Bounded { lower: 0.0, ..best }, false)));
+                return Ok(best.map(|value| (Bounded { value, lower: 0.0, upper }, false)));
             }
             let vertices = self.vertices(Some(&allowed))?;
             is_complete &= vertices.len() <= MAX_VERTICES;
-            for vertex in &vertices {
-                let better = best.as_ref().is_none_or(|best| vertex.losses[0] < best.value);
-                if keeps(&vertex.losses[1], limit) && better {
-                    let upper = (vertex.losses[0].to_f64() + vertex.errors[0]).next_up();
-                    best = Some(Bounded { value: vertex.losses[0].clone(), lower: 0.0, upper });
+            for vertex in vertices.iter().filter(|vertex| keeps(&vertex.losses[1], limit)) {
+                // In doubles, the loss of a policy is an upper bound only if the policy is proved to be within
+                // the limit.
+                if vertex.losses[1].to_f64() + vertex.errors[1] <= kept_limit(limit.to_f64()) {
+                    upper = upper.min((vertex.losses[0].to_f64() + vertex.errors[0]).next_up());
+                }
+                if best.as_ref().is_none_or(|best| vertex.losses[0] < *best) {
+                    best = Some(vertex.losses[0].clone());
                 }
             }
-            let Some((bound, segment)) = lower_hull(&vertices, limit) else { continue };
-            let improves = best.as_ref().is_none_or(|best| bound.clearly_less(&best.value));
+            let Some((bound, segment)) = lower_hull(&vertices, limit) else {
+                if !vertices.is_empty() && !self.is_infeasible(limit, Some(&allowed))? {
+                    lower = lower.min(self.below(&vertices, None, limit, Some(&allowed))?);
+                }
+                continue;
+            };
+            let improves = best.as_ref().is_none_or(|best| bound.clearly_less(best));
             let state = segment
                 .filter(|_| improves)
                 .and_then(|(left, right)| self.difference(&vertices[left].policy, &vertices[right].policy));
@@ -337,7 +386,8 @@ impl<'a, N: Number> Pareto<'a, N> {
                 open.push(restricted);
             }
         }
-        Ok(best.map(|best| (Bounded { lower: lower.min(best.upper), ..best }, is_complete)))
+        let proved = is_complete && (N::EXACT || upper.is_finite());
+        Ok(best.map(|value| (Bounded { value, lower: lower.min(upper), upper }, proved)))
     }
 
     /// Returns the first state, in breadth-first order under `policy` before a target is reached,

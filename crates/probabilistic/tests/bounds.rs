@@ -2,7 +2,7 @@
 //! time are rejected.
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, PolicyTable, Quantity, check};
-use metaplan_probabilistic::{Error, prism, property};
+use metaplan_probabilistic::{Error, jani, prism, property};
 use num_rational::BigRational;
 
 fn outcome(model: &str, question: &str, options: &Options<'_>) -> Result<Outcome, Error> {
@@ -337,6 +337,35 @@ fn two_objectives_in_doubles_have_enclosing_bounds() {
     }
 }
 
+/// Values by hand: `b` satisfies the bound at cost 1 and `d` at cost 5. In doubles, the probabilities of `a` and `b` are so
+/// close that the cheaper `a` represents both.
+#[test]
+fn a_bound_near_the_optimum_is_not_refuted_in_doubles() {
+    let near = "[a] s=0 -> 0.5:(s'=1) + 0.5:(s'=2); [b] s=0 -> 0.5000000001:(s'=1) + 0.4999999999:(s'=2);";
+    let costly = "[d] s=0 -> 0.9:(s'=1) + 0.1:(s'=2);";
+    let question = "multi(R{\"cost\"}min=? [ F \"end\" ], P>=0.50000000005 [ F \"good\" ])";
+    for commands in [near.to_owned(), format!("{near} {costly}")] {
+        let model = format!(
+            "mdp module m s:[0..2] init 0; {commands} endmodule
+            rewards \"cost\" [b] true : 1; [d] true : 5; endrewards
+            label \"end\" = s>0; label \"good\" = s=1;"
+        );
+        let answer = |exactness| outcome(&model, question, &Options::default().with_exactness(exactness));
+        let Ok(Outcome::Constrained { deterministic: exact, proved: true, .. }) = answer(Exactness::Always)
+        else {
+            panic!("{commands}")
+        };
+        assert_eq!(exact.quantity().map(|exact| exact.value.to_bits()), Some(1.0_f64.to_bits()));
+        let Ok(Outcome::Constrained { deterministic, proved, .. }) = answer(Exactness::Never) else {
+            panic!("{commands}")
+        };
+        match deterministic.quantity() {
+            Some(quantity) => assert!(quantity.lower <= 1.0 && 1.0 <= quantity.upper, "{quantity:?}"),
+            None => assert!(!proved, "{commands}"),
+        }
+    }
+}
+
 #[test]
 fn extreme_models_are_rejected_or_answered() {
     let wide =
@@ -391,7 +420,13 @@ fn deep_and_large_expressions_are_rejected() {
         for (link, length) in [("f & x>=0", 5000), ("f & f", 60)] {
             let model = model(&chain(link, length), &format!("f{length}"));
             assert_eq!(error_codes(&model, "Pmax=? [ F \"goal\" ]", Exactness::Auto)[0], "Q104", "{link}");
+            let renamed = format!("{model} module n = m [x=y] endmodule");
+            let renamed = prism::parse(&renamed).expect_err("too large");
+            assert_eq!(renamed.diagnostics()[0].code, "Q104", "{link}");
         }
+        let model = model(&chain("f & f", 60), "f60");
+        let document = jani::write("m", &prism::parse(&model).expect("a model")).expect_err("too large");
+        assert_eq!(document.diagnostics()[0].code, "Q104");
     };
     let thread = std::thread::Builder::new().stack_size(16 << 20).spawn(deep);
     thread.expect("a thread").join().expect("no panic");

@@ -3,7 +3,7 @@
 
 use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, check};
 use metaplan_probabilistic::explore::Bounds;
-use metaplan_probabilistic::{jani, prism, property};
+use metaplan_probabilistic::{Error, jani, prism, property};
 use proptest::prelude::*;
 
 const MODEL: &str = "mdp
@@ -277,4 +277,24 @@ fn jani_has_the_initial_states_of_the_model() {
     let jani = jani::write("m", &prism::parse(&without).expect("a model")).expect("JANI");
     assert!(jani.get("restrict-initial").is_none(), "{jani}");
     assert_eq!(jani["variables"][0]["initial-value"], 0);
+}
+
+/// Exploration of this model ends at once, so only the computation of the values can be cancelled.
+#[test]
+fn computations_of_values_are_cancelled() {
+    let model = "mdp module m s:[0..2] init 0; [a] s=0 -> 0.5:(s'=1) + 0.5:(s'=0); [b] s=1 -> 0.5:(s'=0) + 0.5:(s'=2);
+        [c] s=1 -> (s'=0); endmodule rewards \"cost\" [a] true : 1; endrewards label \"goal\" = s=2;";
+    let model = prism::parse(model).expect("a model");
+    for (question, exactness) in [
+        ("R{\"cost\"}max=? [ C<=999999999 ]", Exactness::Never),
+        ("Pmax=? [ F^{rew{\"cost\"}<=99999} s=7 ]", Exactness::Always),
+    ] {
+        let question = property::parse(question).expect("a property");
+        let calls = std::cell::Cell::new(0);
+        let progress = |_: usize| calls.replace(calls.get() + 1) == 0;
+        let options = Options::default().with_exactness(exactness);
+        let options = options.with_bounds(Bounds::default().with_progress(&progress));
+        let cancelled = check(&model, &question, &options).map(|report| report.outcome);
+        assert!(matches!(cancelled, Err(Error::Interrupted { states: 3 })), "{question:?}: {cancelled:?}");
+    }
 }

@@ -314,6 +314,7 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
     ) -> Iterator[PlanGenerationResult]:
         began, share = time.monotonic(), 0.1
         best: Fraction | None = None
+        maximizes = any(metric.is_maximize_expression_on_final_state() for metric in problem.quality_metrics)
         while True:
             left = None if timeout is None else timeout - (time.monotonic() - began)
             is_last = left is not None and left <= share
@@ -327,10 +328,12 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             if is_ended or is_last:
                 yield result
                 return
-            if result.plan is not None and (best is None or Fraction(result.metrics["cost"]) < best):
-                best = Fraction(result.metrics["cost"])
-                result.status = PlanGenerationResultStatus.INTERMEDIATE
-                yield result
+            if result.plan is not None:
+                cost = Fraction(result.metrics["cost"])
+                if best is None or (cost > best if maximizes else cost < best):
+                    best = cost
+                    result.status = PlanGenerationResultStatus.INTERMEDIATE
+                    yield result
             share = min(2 * share, _MAX_SHARE)
 
     def _answer(self, problem: Any, timeout: float | None, output_stream: IO[str] | None) -> PlanGenerationResult:

@@ -8,8 +8,10 @@ import pytest
 
 up = pytest.importorskip("unified_planning", reason="unified-planning is not there")
 
+from unified_planning.engines import PlanGenerationResult
 from unified_planning.engines import PlanGenerationResultStatus as Status
 from unified_planning.engines import ValidationResultStatus
+from unified_planning.model.metrics import MaximizeExpressionOnFinalState, MinimizeExpressionOnFinalState
 from unified_planning.model.walkers.state_evaluator import StateEvaluator
 from unified_planning.plans import SequentialPlan
 from unified_planning.shortcuts import AnytimePlanner, OneshotPlanner, PlanValidator, Problem, Replanner, SequentialSimulator
@@ -329,6 +331,25 @@ def test_without_a_metric_the_first_plan_ends_the_search():
     with AnytimePlanner(name="metaplan") as planner:
         results = list(planner.get_solutions(EXAMPLES["basic"].problem))
     assert [result.status for result in results] == [Status.SOLVED_SATISFICING]
+
+
+@pytest.mark.parametrize(("metric", "yielded"), [(MinimizeExpressionOnFinalState, [5, 3]), (MaximizeExpressionOnFinalState, [5, 7])])
+def test_only_better_plans_are_intermediate(metric, yielded):
+    problem = EXAMPLES["basic"].problem.clone()
+    problem.add_quality_metric(metric(problem.add_fluent("gain", up.shortcuts.RealType())()))
+    costs = iter([5, 3, 7])
+
+    def answer(*_):
+        cost = next(costs, None)
+        if cost is None:
+            return PlanGenerationResult(Status.UNSOLVABLE_PROVEN, None, engine_name="metaplan")
+        plan = EXAMPLES["basic"].valid_plans[0]
+        return PlanGenerationResult(Status.SOLVED_SATISFICING, plan, engine_name="metaplan", metrics={"cost": str(cost)})
+
+    engine = metaplan.up.MetaplanEngine()
+    engine._answer = answer
+    results = list(engine._get_solutions(problem))
+    assert [int(result.metrics["cost"]) for result in results if result.status == Status.INTERMEDIATE] == yielded
 
 
 def test_a_problem_without_a_metric_gets_a_certificate(tmp_path):

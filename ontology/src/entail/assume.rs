@@ -9,12 +9,13 @@ use crate::lower::lower;
 use crate::owl::{AnnotatedAxiom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression, Ontology};
 use crate::vocab::owl;
 
+/// Upper limit on the number of cases of an assumption; each case is a copy of the engine.
 const MAX_CASES: usize = 64;
 
 impl Prover {
     /// Assumes that an individual is in a class, in copies of the engine: one for each case of a disjunction.
-    /// `next` is the number of the last fresh name. Parts of the class that rules cannot express are not
-    /// assumed, so that a proof remains sound.
+    /// `next` is the number of the last fresh name. Parts of the class that rules cannot express, or that would
+    /// lead to more than [`MAX_CASES`] cases, are not assumed, so that a proof remains sound.
     pub(super) fn assume(
         engine: &Engine,
         class: &ClassExpression,
@@ -31,11 +32,7 @@ impl Prover {
             C::IntersectionOf(classes) => {
                 let mut cases = vec![copy];
                 for class in classes {
-                    let mut extended = Vec::new();
-                    for case in &cases {
-                        extended.extend(Self::assume(case, class, individual, next)?);
-                    }
-                    cases = extended;
+                    cases = Self::assume_in_each(cases, class, individual, next)?;
                 }
                 return Ok(cases);
             }
@@ -43,6 +40,9 @@ impl Prover {
                 let mut cases = Vec::new();
                 for class in classes {
                     cases.extend(Self::assume(&copy, class, individual, next)?);
+                }
+                if cases.len() > MAX_CASES {
+                    cases = vec![copy];
                 }
                 return Ok(cases);
             }
@@ -74,6 +74,24 @@ impl Prover {
         Ok(vec![with_facts(&copy, [fact])?])
     }
 
+    /// Assumes in each case that an individual is in a class. Returns the given cases if there would be more than
+    /// [`MAX_CASES`].
+    fn assume_in_each(
+        cases: Vec<Engine>,
+        class: &ClassExpression,
+        individual: &Iri,
+        next: &mut usize,
+    ) -> Result<Vec<Engine>, Error> {
+        let mut extended = Vec::new();
+        for case in &cases {
+            extended.extend(Self::assume(case, class, individual, next)?);
+            if extended.len() > MAX_CASES {
+                return Ok(cases);
+            }
+        }
+        Ok(extended)
+    }
+
     /// Assumes that `individual` has `count` pairwise different fresh values of a property, all in the class
     /// `filler`. Returns one engine for each case.
     fn witnesses(
@@ -97,11 +115,7 @@ impl Prover {
         facts.extend(pairwise_different(&mut copy, &names));
         let mut cases = vec![with_facts(&copy, facts)?];
         for name in &names {
-            let mut extended = Vec::new();
-            for case in &cases {
-                extended.extend(Self::assume(case, filler, name, next)?);
-            }
-            cases = extended;
+            cases = Self::assume_in_each(cases, filler, name, next)?;
         }
         Ok(cases)
     }

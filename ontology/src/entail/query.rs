@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use rules::{Error, Symbol};
+use rules::{Engine, Error, Interrupt, RuleIdentity, Symbol};
 
-use super::prover::{Answer, Prover, edge, explain, literal, same, value};
+use super::prover::{Answer, Prover, edge, explain, literal, member, same, value};
 use crate::owl::{ANONYMOUS, Axiom, ClassExpression, Iri, ObjectPropertyExpression as Property};
+use crate::vocab::owl;
 
 const MAX_PARTIAL_ANSWERS: usize = 100_000;
 
@@ -17,7 +18,9 @@ impl Prover {
     /// answer is open if none is found, or if the budget of partial answers is exhausted.
     pub(super) fn conjunctive_query(&self, statements: &[&Axiom]) -> Result<Answer, Error> {
         let mut budget = MAX_PARTIAL_ANSWERS;
-        let explanation = self.extend(&Assignment::new(), statements.to_vec(), &mut budget)?;
+        // All statements share one copy of the engine, in which only symbols are added.
+        let mut engine = self.base.clone();
+        let explanation = self.extend(&mut engine, &Assignment::new(), statements.to_vec(), &mut budget)?;
         Ok(match explanation {
             Some(reason) => Answer::Follows(reason),
             None if budget == 0 => Answer::Open("there are too many candidate individuals"),
@@ -29,6 +32,7 @@ impl Prover {
     /// individuals comes first. Returns the explanation of the first answer.
     fn extend(
         &self,
+        engine: &mut Engine,
         assignment: &Assignment,
         mut statements: Vec<&Axiom>,
         budget: &mut usize,
@@ -37,6 +41,9 @@ impl Prover {
             return Ok(None);
         }
         *budget -= 1;
+        if engine.limits().interrupt.as_ref().is_some_and(Interrupt::is_over) {
+            return Err(Error::Interrupted { rule: RuleIdentity::new("the query", 0) });
+        }
         let unknown =
             |axiom: &Axiom| names(axiom).into_iter().filter(|name| is_open(assignment, name)).count();
         let Some(index) = (0..statements.len()).min_by_key(|index| {
@@ -47,8 +54,8 @@ impl Prover {
         };
         let axiom = statements.remove(index);
         if unknown(axiom) == 0 {
-            let Some(reason) = self.holds(assignment, axiom)? else { return Ok(None) };
-            return Ok(self.extend(assignment, statements, budget)?.map(|tail| reason + &tail));
+            let Some(reason) = self.holds(engine, assignment, axiom)? else { return Ok(None) };
+            return Ok(self.extend(engine, assignment, statements, budget)?.map(|tail| reason + &tail));
         }
         let open: Vec<Iri> = names(axiom).into_iter().filter(|name| is_open(assignment, name)).collect();
         for candidate in self.candidates(assignment, axiom, &open[0]) {
@@ -57,7 +64,7 @@ impl Prover {
             extended.insert(open[0].clone(), candidate);
             let mut pending = statements.clone();
             pending.push(axiom);
-            if let Some(reason) = self.extend(&extended, pending, budget)? {
+            if let Some(reason) = self.extend(engine, &extended, pending, budget)? {
                 return Ok(Some(reason));
             }
         }
@@ -106,26 +113,34 @@ impl Prover {
         }
     }
 
-    fn holds(&self, assignment: &Assignment, axiom: &Axiom) -> Result<Option<String>, Error> {
-        let mut copy = self.base.clone();
+    fn holds(
+        &self,
+        engine: &mut Engine,
+        assignment: &Assignment,
+        axiom: &Axiom,
+    ) -> Result<Option<String>, Error> {
         let name = |iri: &Iri| assignment.get(iri).cloned().unwrap_or_else(|| iri.clone());
         Ok(match axiom {
+            Axiom::ClassAssertion(ClassExpression::Class(class), individual) if &**class != owl::THING => {
+                let goal = member(engine, class, &name(individual));
+                explain(engine, &goal)
+            }
             Axiom::ClassAssertion(class, individual) => {
-                return Self::is_in(&copy, class, &name(individual), &mut 0);
+                return Self::is_in(engine, class, &name(individual), &mut 0);
             }
             Axiom::ObjectPropertyAssertion(property, from, to) => {
-                let goal = edge(&mut copy, property, &name(from), &name(to));
-                explain(&copy, &goal)
+                let goal = edge(engine, property, &name(from), &name(to));
+                explain(engine, &goal)
             }
             Axiom::DataPropertyAssertion(property, from, to) => {
-                let goal = value(&mut copy, property, &name(from), literal(to));
-                explain(&copy, &goal)
+                let goal = value(engine, property, &name(from), literal(to));
+                explain(engine, &goal)
             }
             Axiom::SameIndividual(individuals) => {
                 let mut explanations = Vec::new();
                 for pair in individuals.windows(2) {
-                    let goal = same(&mut copy, &name(&pair[0]), &name(&pair[1]));
-                    explanations.push(explain(&copy, &goal));
+                    let goal = same(engine, &name(&pair[0]), &name(&pair[1]));
+                    explanations.push(explain(engine, &goal));
                 }
                 explanations.into_iter().collect::<Option<Vec<_>>>().map(|all| all.join("\n"))
             }

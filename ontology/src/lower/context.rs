@@ -66,7 +66,13 @@ pub(crate) struct Variables {
     keys: Vec<Iri>,
 }
 
+const TOO_MANY_VARIABLES: &str = "it needs more than 65,536 variables";
+
+/// Upper limit on the number of variables of a rule, because a variable has 16 bits.
+const MAX_VARIABLES: usize = 1 << 16;
+
 impl Variables {
+    /// Returns a new variable. Beyond [`MAX_VARIABLES`], numbers repeat; [`Context::rule`] then rejects the rule.
     pub(crate) fn fresh(&mut self, name: &str) -> Term {
         self.keys.push(name.into());
         Term::Variable(Variable((self.keys.len() - 1) as u16))
@@ -79,8 +85,10 @@ impl Variables {
         }
     }
 
-    fn names(&self) -> Vec<Box<str>> {
-        self.keys.iter().map(|key| local_name(key).into()).collect()
+    /// Returns the names of the variables; `None` if there are more than [`MAX_VARIABLES`].
+    fn names(&self) -> Option<Vec<Box<str>>> {
+        let names = || self.keys.iter().map(|key| local_name(key).into()).collect();
+        (self.keys.len() <= MAX_VARIABLES).then(names)
     }
 }
 
@@ -229,7 +237,7 @@ impl<'a> Context<'a> {
         body: Conjunction,
         variables: &Variables,
     ) {
-        let variables = variables.names();
+        let Some(variables) = variables.names() else { return self.gap(TOO_MANY_VARIABLES) };
         self.rules.push(Rule { identity: identity.clone(), head, body, variables });
     }
 
@@ -240,7 +248,8 @@ impl<'a> Context<'a> {
         body: Conjunction,
         variables: &Variables,
     ) {
-        let (identity, variables) = (labelled(class.to_string(), 0), variables.names());
+        let Some(variables) = variables.names() else { return self.gap(TOO_MANY_VARIABLES) };
+        let identity = labelled(class.to_string(), 0);
         self.auxiliary.push(Rule { identity, head: vec![head], body, variables });
     }
 

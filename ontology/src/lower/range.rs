@@ -49,7 +49,7 @@ impl RangeLowering<'_, '_> {
     /// accepted.
     fn tests(&mut self, range: &DataRange, inside: bool, depth: usize) -> Tests {
         if depth == 0 {
-            return Err("datatypes that are defined by each other");
+            return Err("data ranges that are nested too deeply or defined by each other");
         }
         match range {
             DataRange::Datatype(iri) => match self.context.definitions.get(iri).cloned() {

@@ -5,14 +5,14 @@
 //! Two forms, which occur in practice, are recognised: `owl:equivalentProperty` with an annotation property
 //! on at least one side, and restrictions on annotation properties. A property that is also declared as an
 //! object or data property does not count. If a class expression contains such a restriction, every axiom
-//! with this expression is removed.
+//! with this expression is removed. A SWRL rule with such an expression is removed as a whole, with a warning.
 
 use oxrdf::{BlankNode, NamedOrBlankNode, Term};
-use rustc_hash::FxHashSet as HashSet;
+use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 
 use crate::error::Warning;
 use crate::graph::{Graph, iri_of};
-use crate::vocab::owl;
+use crate::vocab::{owl, rdf, swrl};
 
 const REASON: &str = "an annotation property has no logical axioms; declare it as an object or data property";
 
@@ -49,23 +49,30 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
             expressions.insert(node.clone());
         }
     }
-    // Propagate from expressions to the expressions that contain them, up to axioms about named entities.
-    loop {
-        let containing = graph.iter().filter_map(|(_, triple)| match (&triple.subject, &triple.object) {
-            (NamedOrBlankNode::BlankNode(outer), Term::BlankNode(inner)) if expressions.contains(inner) => {
-                Some(outer.clone())
-            }
-            _ => None,
-        });
-        let added: Vec<BlankNode> = containing.filter(|node| !expressions.contains(node)).collect();
-        if added.is_empty() {
-            break;
-        }
-        expressions.extend(added);
+    if expressions.is_empty() && removed.is_empty() {
+        return;
     }
+    let expressions = closure(graph, expressions);
+    let rules: HashSet<NamedOrBlankNode> =
+        graph.instances(swrl::IMP).into_iter().map(|(_, rule)| rule).collect();
+    let is_part = |node: &BlankNode| expressions.contains(node);
+    let unusable: HashSet<NamedOrBlankNode> = graph
+        .iter()
+        .filter(|(_, triple)| matches!(&triple.object, Term::BlankNode(node) if is_part(node)))
+        .map(|(_, triple)| triple.subject.clone())
+        .filter(|subject| rules.contains(subject))
+        .collect();
     let mut parts = Vec::new();
     for (index, triple) in graph.iter() {
-        let is_part = |node: &BlankNode| expressions.contains(node);
+        if unusable.contains(&triple.subject) {
+            // Without its body or head, a rule would have another meaning.
+            parts.push(index);
+            if triple.predicate.as_str() == rdf::TYPE {
+                let statement = "a rule with a restriction of an annotation property".to_owned();
+                warnings.push(Warning::Unread { statement, reason: REASON.to_owned() });
+            }
+            continue;
+        }
         match (&triple.subject, &triple.object) {
             (NamedOrBlankNode::BlankNode(node), _) if is_part(node) => parts.push(index),
             (NamedOrBlankNode::NamedNode(_), Term::BlankNode(node)) if is_part(node) => removed.push(index),
@@ -85,4 +92,25 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     for index in parts {
         graph.take(index);
     }
+}
+
+/// Adds the blank nodes that contain one of `expressions`, directly or indirectly.
+fn closure(graph: &Graph, mut expressions: HashSet<BlankNode>) -> HashSet<BlankNode> {
+    let mut containers: HashMap<BlankNode, Vec<BlankNode>> = HashMap::default();
+    for (_, triple) in graph.iter().filter(|_| !expressions.is_empty()) {
+        if let (NamedOrBlankNode::BlankNode(outer), Term::BlankNode(inner)) =
+            (&triple.subject, &triple.object)
+        {
+            containers.entry(inner.clone()).or_default().push(outer.clone());
+        }
+    }
+    let mut open: Vec<BlankNode> = expressions.iter().cloned().collect();
+    while let Some(inner) = open.pop() {
+        for outer in containers.remove(&inner).into_iter().flatten() {
+            if expressions.insert(outer.clone()) {
+                open.push(outer);
+            }
+        }
+    }
+    expressions
 }

@@ -18,7 +18,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     let structural = structural(graph);
     let individuals = individuals(graph, &structural);
     let mut removed = Vec::new();
-    let mut stray: BTreeMap<String, usize> = BTreeMap::new();
+    let mut stray: BTreeMap<String, HashSet<BlankNode>> = BTreeMap::new();
     for index in 0..graph.len() {
         // Indices of removed triples remain in use.
         let Some(triple) = graph.get_mut(index) else { continue };
@@ -26,7 +26,7 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
             if individuals.contains(node) {
                 triple.subject = name(node).into();
             } else if !structural.contains(node) {
-                *stray.entry(triple.predicate.to_string()).or_default() += 1;
+                stray.entry(triple.predicate.to_string()).or_default().insert(node.clone());
                 removed.push(index);
             }
         }
@@ -39,8 +39,8 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     for index in removed {
         graph.take(index);
     }
-    warnings.extend(stray.into_iter().map(|(predicate, count)| Warning::Unread {
-        statement: format!("{predicate} of {count} blank nodes"),
+    warnings.extend(stray.into_iter().map(|(predicate, nodes)| Warning::Unread {
+        statement: format!("{predicate} of {} blank nodes", nodes.len()),
         reason: "there are no other statements about them".to_owned(),
     }));
 }

@@ -23,7 +23,6 @@ use num_rational::BigRational;
 use rules::{Delta, Symbol};
 
 use super::knowledge::Runtime;
-use super::state::Objective;
 use crate::error::Error;
 use crate::tomasys::Individual;
 use crate::tomasys::change;
@@ -201,12 +200,12 @@ impl Runtime {
         copy.error_status(&name)
     }
 
-    /// Ends a cycle of the adaptation loop (see [`Runtime::conclude`]). Returns the first of the objective's
-    /// statuses if the objective is in error, and otherwise `None`.
+    /// Ends a cycle of the adaptation loop (see [`Runtime::conclude`]). Returns the first status of the objective
+    /// that is an error; `None` without an error.
     fn error_status(&mut self, objective: &str) -> Result<Option<String>, Error> {
         self.conclude()?;
         let objective_state = self.objectives().into_iter().find(|state| state.individual.iri == objective);
-        Ok(objective_state.filter(Objective::is_in_error).and_then(|state| state.statuses.into_iter().next()))
+        Ok(objective_state.and_then(|state| state.error().map(str::to_owned)))
     }
 }
 

@@ -33,7 +33,11 @@ pub struct Objective {
 impl Objective {
     /// Returns `true` if a status of the objective requires another design, for example `IN_ERROR_FR`.
     pub fn is_in_error(&self) -> bool {
-        self.statuses.iter().any(|status| ERRORS.contains(&status.as_str()))
+        self.error().is_some()
+    }
+
+    pub(super) fn error(&self) -> Option<&str> {
+        self.statuses.iter().map(String::as_str).find(|status| ERRORS.contains(status))
     }
 
     /// Returns `true` if a design should be selected for the objective now.

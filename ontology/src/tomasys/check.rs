@@ -14,6 +14,7 @@ use crate::owl::{
     AnnotatedAxiom, Argument, Atom, Axiom, Characteristic, DataRange, Iri, Literal,
     ObjectPropertyExpression as Property, Ontology,
 };
+use crate::vocab::{owl, xsd};
 
 /// Checks a model for probable mistakes. `engine` contains the consequences of `ontology` under the given semantics of
 /// names. Returns the warnings, sorted.
@@ -190,6 +191,30 @@ fn statuses(ontology: &Ontology) -> Vec<Warning> {
     warnings
 }
 
+const NUMBERS: [&str; 18] = [
+    "decimal",
+    "integer",
+    "float",
+    "double",
+    "byte",
+    "short",
+    "int",
+    "long",
+    "unsignedByte",
+    "unsignedShort",
+    "unsignedInt",
+    "unsignedLong",
+    "nonNegativeInteger",
+    "nonPositiveInteger",
+    "positiveInteger",
+    "negativeInteger",
+    "real",
+    "rational",
+];
+const STRINGS: [&str; 8] =
+    ["string", "normalizedString", "token", "language", "Name", "NCName", "NMTOKEN", "anyURI"];
+
+/// Returns the kinds of values in the ranges of a property: all kinds if a datatype is unknown.
 fn kinds_of_ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
     let mut kinds = BTreeSet::new();
     for annotated in &ontology.axioms {
@@ -198,11 +223,12 @@ fn kinds_of_ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str
                 kinds.extend(values.iter().map(|literal| kind(&value(literal))));
             }
             Axiom::DataPropertyRange(ranged, DataRange::Datatype(datatype)) if &**ranged == property => {
-                kinds.insert(match crate::vocab::local_name(datatype) {
-                    "boolean" => "a boolean",
-                    "string" => "a string",
-                    _ => "a number",
-                });
+                match datatype.strip_prefix(xsd::NS).or_else(|| datatype.strip_prefix(owl::NS)) {
+                    Some("boolean") => kinds.extend(["a boolean"]),
+                    Some(name) if STRINGS.contains(&name) => kinds.extend(["a string"]),
+                    Some(name) if NUMBERS.contains(&name) => kinds.extend(["a number"]),
+                    _ => kinds.extend(["a boolean", "a number", "a string"]),
+                }
             }
             _ => {}
         }

@@ -16,6 +16,8 @@ use crate::source::Source;
 use crate::symbol::{Symbol, Symbols};
 
 const MATCH_LIMIT: usize = 1 << 21;
+/// Upper limit on the number of partial matches of one body. Tests use a lower limit.
+const PARTIAL_MATCH_LIMIT: usize = if cfg!(test) { 1 << 16 } else { 8 * MATCH_LIMIT };
 
 /// Values of the variables of a rule; `None` for an unbound variable.
 pub(super) type Values = Vec<Option<Symbol>>;
@@ -60,7 +62,7 @@ fn group(body: &[Atom], position: usize) -> Vec<Term> {
 
 impl Matcher<'_> {
     /// Returns the matches of a rule's body. If [`Matcher::too_many`] is set, matches may be missing, because the
-    /// enumeration was stopped at [`MATCH_LIMIT`]. An individual with several names is represented by its
+    /// enumeration was stopped at a limit. An individual with several names is represented by its
     /// smallest name ([`Names::find`]).
     pub fn matches_of(&mut self, rule: &Rule) -> Vec<Values> {
         let mut matches = Vec::new();
@@ -70,11 +72,12 @@ impl Matcher<'_> {
     }
 
     /// Extends `values` by the open atoms of a body, in depth-first order, and appends each complete match to
-    /// `matches`. Stops at [`MATCH_LIMIT`] matches.
+    /// `matches`. Stops at [`MATCH_LIMIT`] matches or [`PARTIAL_MATCH_LIMIT`] partial matches.
     fn extend(&mut self, body: &[Atom], open: &[usize], values: Values, matches: &mut Vec<Values>) {
         let mut states: Vec<(Rc<[usize]>, Values)> = vec![(open.into(), values)];
+        let mut partial_matches = 0_usize;
         while let Some((open, values)) = states.pop() {
-            self.too_many |= matches.len() >= MATCH_LIMIT;
+            self.too_many |= matches.len() >= MATCH_LIMIT || partial_matches >= PARTIAL_MATCH_LIMIT;
             if self.too_many {
                 return;
             }
@@ -83,6 +86,7 @@ impl Matcher<'_> {
                 continue;
             }
             let (position, next) = self.step(body, &open, values);
+            partial_matches = partial_matches.saturating_add(next.len());
             let remaining: Rc<[usize]> =
                 open.iter().copied().filter(|other| Some(*other) != position).collect();
             states.extend(next.into_iter().rev().map(|extended| (Rc::clone(&remaining), extended)));
@@ -277,5 +281,30 @@ fn is_ready(body: &[Atom], position: usize, values: &Values) -> bool {
             built_in.binds(&arguments.iter().map(is_bound).collect::<Vec<_>>())
         }
         Atom::Aggregate { .. } => group(body, position).iter().all(is_bound),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::replay::{Fault, replay};
+    use crate::{Engine, Fact, Prefixes, Program, Symbols, parse_rules};
+
+    /// The comparisons fail, but only after all three atoms are matched in 8 million ways.
+    #[test]
+    fn partial_matches_are_limited() {
+        let mut symbols = Symbols::new();
+        let text =
+            "p(?x, ?a) ^ p(?y, ?b) ^ p(?z, ?c) ^ swrlb:lessThan(?c, ?a) ^ swrlb:lessThan(?a, ?c) -> q(?x) .";
+        let program = parse_rules(text, "test", &mut symbols, &Prefixes::default()).expect("rules");
+        let predicate = symbols.name("p");
+        let facts = (0..200).map(|number| {
+            let arguments = [symbols.name(&format!("n{number}")), symbols.literal(number.into())];
+            Fact::new(predicate, arguments)
+        });
+        let facts: Vec<Fact> = facts.collect();
+        let engine = Engine::new(symbols, Program::default(), facts.clone()).expect("no rules");
+        let derivation = engine.everything();
+        let fault = replay(&program, &mut engine.symbols().clone(), &facts, &derivation);
+        assert!(matches!(fault, Err(Fault::TooMany(_))), "{fault:?}");
     }
 }

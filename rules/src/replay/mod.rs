@@ -138,6 +138,8 @@ impl Replayer<'_> {
         // State before a step: the equal names and, under equality, the facts of all earlier steps.
         let mut names = Names::default();
         let mut established: FxHashSet<Fact> = FxHashSet::default();
+        // Set by a new equality, which changes the first names of established facts.
+        let mut is_outdated = false;
         for (position, step) in derivation.steps.iter().enumerate() {
             let checked = match &step.reason {
                 Reason::Asserted => {
@@ -146,6 +148,10 @@ impl Replayer<'_> {
                 Reason::Equality { .. } => {
                     let is_one = self.is_pair(&step.fact)
                         && names.find(step.fact.arguments[0]) == names.find(step.fact.arguments[1]);
+                    if is_outdated && !is_one {
+                        established = established.iter().map(|fact| names.normal(fact)).collect();
+                        is_outdated = false;
+                    }
                     let follows =
                         self.program.equality && (is_one || established.contains(&names.normal(&step.fact)));
                     follows.then_some(()).ok_or("does not follow by equality".to_owned())
@@ -164,10 +170,8 @@ impl Replayer<'_> {
             };
             checked.map_err(|reason| Fault::Step { step: position, fact: self.show(&step.fact), reason })?;
             if self.program.equality {
-                // A new equality changes the first names of earlier facts.
-                if self.is_pair(&step.fact) && names.join(step.fact.arguments[0], step.fact.arguments[1]) {
-                    established = established.iter().map(|fact| names.normal(fact)).collect();
-                }
+                is_outdated |=
+                    self.is_pair(&step.fact) && names.join(step.fact.arguments[0], step.fact.arguments[1]);
                 established.insert(names.normal(&step.fact));
             }
         }

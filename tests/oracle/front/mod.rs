@@ -24,7 +24,8 @@ use pddl::{Source, portable, print_domain, print_problem};
 use planner::{Config, Limits, Status, Thresholds};
 
 use crate::judge::{
-    Failure, Mode, Step, Tally, Truth, compare, plan_lines, project_verdict, rational, setting, steps_of,
+    Failure, Mode, Step, Tally, Truth, compare, is_over, plan_lines, project_verdict, rational, setting,
+    steps_of,
 };
 use crate::temporal;
 use robots::{Form, Robot};
@@ -315,7 +316,7 @@ fn run(front: &str, default: u64, min_percent: usize) {
     let (mut samples, mut tally) = (samples(front), Tally::default());
     // Some seeds have no sample, so tasks are counted instead of seeds.
     for seed in from.. {
-        if tally.tasks == tasks {
+        if tally.tasks == tasks || is_over(&tally) {
             break;
         }
         if let Some(sample) = samples(seed) {

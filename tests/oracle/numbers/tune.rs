@@ -25,8 +25,12 @@ pub fn tune(task: &mut Task, wishes: &Wishes, rng: &mut Rng) {
     task_with_wishes.goal =
         wishes.atoms.iter().map(|(p, objects)| Condition::Holds(ground_atom(*p, objects))).collect();
     let Some(open) = ground(&task_with_wishes, &wishes.numbers, MAX_INSTANCES) else {
-        // There are too many instances for random walks, so the thresholds are drawn at random, and the goal stays empty.
-        return close(task, &[], rng);
+        // There are too many instances for random walks, so thresholds and goal are drawn at random. An empty goal
+        // would be satisfied by the empty plan.
+        close(task, &[], rng);
+        let (predicate, objects) = draw::one_of(rng, &wishes.atoms);
+        task.goal = vec![Condition::Holds(ground_atom(predicate, &objects))];
+        return;
     };
     let mut observed: Vec<Vec<Number>> = Vec::new();
     let mut last = start(&open);

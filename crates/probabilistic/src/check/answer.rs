@@ -70,11 +70,12 @@ pub enum Outcome {
     Front(Vec<[Answer; 2]>),
     /// The optimum of one objective under a bound on another.
     Constrained {
-        /// The optimum over randomised policies.
+        /// The optimum over randomised policies; undefined if no policy was found within the bound.
         randomised: Answer,
         /// The best value found over deterministic policies; undefined if no policy was found.
         deterministic: Answer,
-        /// `true` if the deterministic value is proved optimal, or if no policy satisfies the bound.
+        /// `true` if the deterministic value is proved optimal, or if it is proved that no policy satisfies the
+        /// bound.
         proved: bool,
     },
 }

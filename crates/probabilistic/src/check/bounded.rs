@@ -7,6 +7,8 @@
 //! Reference: Hartmanns, Junges, Katoen and Quatmann, "Multi-Cost Bounded Reachability in MDP",
 //! TACAS 2018.
 
+use std::collections::VecDeque;
+
 use fixedbitset::FixedBitSet;
 use num_traits::{Signed, ToPrimitive};
 
@@ -69,18 +71,22 @@ impl<N: Number> Query<'_, N> {
         }
         // Values for the last budgets (remaining rewards), the smallest budget first. No usable choice has
         // a reward above `greatest`, so at most `greatest` older vectors are read.
-        let mut previous: Vec<Vec<N>> = Vec::new();
+        let mut previous: VecDeque<Vec<N>> = VecDeque::new();
         let mut vector = Vector::exactly(vec![N::zero(); n], Span::Probability);
         let mut error = 0.0_f64;
         let sweep = Sweep::new(&layers, problem, &earned);
         let widest = layers.paid.iter().map(|choice| self.mdp().targets(*choice).len()).max().unwrap_or(0);
+        // Exact arithmetic is slower, so the callback is called after fewer transitions.
+        let entries = self.mdp().transition_count().saturating_mul(if N::EXACT { 64 } else { 1 });
         for budget in 0..=budgets {
+            within_budget(self.work.borrow_mut().poll(entries))?;
             // The oldest vector is no longer read, so its memory is reused.
-            let mut values = if previous.len() > greatest { previous.remove(0) } else { vec![N::zero(); n] };
+            let oldest = if previous.len() > greatest { previous.pop_front() } else { None };
+            let mut values = oldest.unwrap_or_else(|| vec![N::zero(); n]);
             if let Some(sweep) = &sweep {
                 within_budget(sweep.layer(&mut values, &previous, budget, &mut self.work.borrow_mut()))?;
                 error += sweep.error;
-                previous.push(values);
+                previous.push_back(values);
                 continue;
             }
             let mut worth = vec![N::zero(); layers.mdp.states()];
@@ -111,9 +117,9 @@ impl<N: Number> Query<'_, N> {
             error += layer_error + (256.0 + count(widest)) * f64::EPSILON;
             values = solution.values;
             values.truncate(n);
-            previous.push(values);
+            previous.push_back(values);
         }
-        vector.values = previous.pop().unwrap_or_default();
+        vector.values = previous.pop_back().unwrap_or_default();
         vector.errors.fill(error);
         Ok(vector.into())
     }
@@ -199,7 +205,13 @@ impl<'a, N: Number> Sweep<'a, N> {
 
     /// Computes the values for `budget` in place from the values for smaller budgets in `previous`.
     /// Returns `None` if exact arithmetic exceeds its budget of work.
-    fn layer(&self, values: &mut [N], previous: &[Vec<N>], budget: usize, work: &mut Work) -> Option<()> {
+    fn layer(
+        &self,
+        values: &mut [N],
+        previous: &VecDeque<Vec<N>>,
+        budget: usize,
+        work: &mut Work<'_>,
+    ) -> Option<()> {
         let mdp = self.problem.mdp;
         for (state, value) in values.iter_mut().enumerate() {
             *value = if self.problem.terminal.contains(state) { N::one() } else { N::zero() };

@@ -91,7 +91,7 @@ pub struct Report {
 ///
 /// # Errors
 /// An error in the model, the property, the constants or the policy, an exceeded limit, or a cancelled
-/// exploration.
+/// exploration or computation.
 pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Result<Report, Error> {
     let reports = check_all(model, [property], options)?;
     reports.into_iter().next().unwrap_or_else(|| Err(Error::Property(Vec::new().into())))
@@ -276,6 +276,9 @@ impl Processes {
             if let Some(answer) = query.answer(property)? {
                 return Ok(report(program, explored, answer, options));
             }
+            if query.work.borrow().is_cancelled() {
+                return Err(Error::Interrupted { states: explored.mdp.states() });
+            }
         }
         if self.doubles.is_none() {
             let rounded = self.exact.as_ref().and_then(Explored::rounded);
@@ -284,7 +287,8 @@ impl Processes {
         }
         let explored = self.doubles.as_ref().expect("invariant: explored just now");
         let answer = Query::new(program, explored, options, computed_rewards, 0)?.answer(property)?;
-        let answer = answer.expect("invariant: doubles cost nothing");
+        // Doubles cost nothing, so that only the caller stops a computation in doubles.
+        let answer = answer.ok_or(Error::Interrupted { states: explored.mdp.states() })?;
         let wide = options.precision.is_some_and(|precision| !answer.0.is_within(precision));
         if let Some(exact) = exact.filter(|_| wide) {
             let budget = DEFAULT_BUDGET.saturating_mul(10);

@@ -5,7 +5,7 @@ use crate::check::ask::{Checked, Stop, property_error, refusal};
 use crate::check::query::Query;
 use crate::error::Place;
 use crate::number::Number;
-use crate::pareto::{Bounded, Constrained, Objective, Pareto};
+use crate::pareto::{Bounded, Objective, Optimum, Pareto};
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, Path, Property, RewardPath};
 use crate::solve::Direction;
 
@@ -23,7 +23,9 @@ impl<N: Number> Query<'_, N> {
             return Err(property_error("Q403", place, "one objective of `multi` must ask for a value").into());
         }
         let objectives = [self.objective(first)?, self.objective(second)?];
-        let Ok(pareto) = Pareto::new(self.mdp(), &objectives) else { return Err(Stop::TooMuchWork) };
+        let Ok(pareto) = Pareto::within(self.mdp(), &objectives, *self.work.borrow()) else {
+            return Err(Stop::TooMuchWork);
+        };
         let answer_of = |number: usize, loss: &N, error: f64| {
             let value = match objectives[number].rewards {
                 Some(_) => loss.clone(),
@@ -87,17 +89,12 @@ fn bound_of(property: &Property) -> Option<&(BinaryOp, Expr)> {
     }
 }
 
-fn constrained<N: Number>(
-    optimum: Option<Constrained<N>>,
-    answer_of: impl Fn(Bounded<N>) -> Answer,
-) -> Outcome {
+fn constrained<N: Number>(optimum: Optimum<N>, answer_of: impl Fn(Bounded<N>) -> Answer) -> Outcome {
     match optimum {
-        None => Outcome::Constrained {
-            randomised: Answer::Undefined,
-            deterministic: Answer::Undefined,
-            proved: true,
-        },
-        Some(optimum) => {
+        Optimum::Infeasible { proved } => {
+            Outcome::Constrained { randomised: Answer::Undefined, deterministic: Answer::Undefined, proved }
+        }
+        Optimum::Found(optimum) => {
             let proved = optimum.deterministic.as_ref().is_some_and(|(_, proved)| *proved);
             Outcome::Constrained {
                 randomised: answer_of(optimum.randomised),

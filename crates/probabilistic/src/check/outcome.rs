@@ -21,7 +21,8 @@ use crate::solve::Direction;
 pub type Attained = (Outcome, Option<Vec<u32>>);
 
 impl<N: Number> Query<'_, N> {
-    /// Evaluates a property on the explored model. Returns `None` if exact arithmetic exceeds its budget.
+    /// Evaluates a property on the explored model. Returns `None` if exact arithmetic exceeds its budget,
+    /// or if the caller has cancelled the computation.
     pub fn answer(&self, property: &Property) -> Result<Option<Attained>, Error> {
         match self.outcome(property) {
             Ok(answer) => Ok(Some(answer)),

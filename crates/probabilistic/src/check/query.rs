@@ -24,7 +24,7 @@ pub struct Query<'a, N> {
     /// The process in doubles, from which an initial policy for exact policy iteration is computed. `None` if
     /// the arithmetic is not exact.
     pub doubles: Option<Mdp<f64>>,
-    pub work: RefCell<Work>,
+    pub work: RefCell<Work<'a>>,
     /// The choices of the given policy; `None` if no policy is given.
     pub evaluated: Option<FixedBitSet>,
 }
@@ -59,7 +59,7 @@ impl<'a, N: Number> Query<'a, N> {
         let evaluated =
             options.evaluate.as_ref().map(|table| table.choices(program, explored)).transpose()?;
         let evaluated = evaluated.map(|policy| choices_of(&explored.mdp, &policy));
-        let mut work = Work::new(work);
+        let mut work = Work::new(work).with_progress(options.bounds.progress, explored.mdp.states());
         if let Some(Precision::Relative(width)) = options.precision {
             work.tight = width.clamp(1e-14, work.tight);
         } else if options.precision.is_some() {

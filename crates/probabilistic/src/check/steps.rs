@@ -23,7 +23,8 @@ impl<N: Number> Stepped<N> {
 }
 
 /// Applies the Bellman operator `steps` times, starting with `values`. The values of terminal and
-/// blocked states do not change. Returns `None` if exact arithmetic exceeds its budget.
+/// blocked states do not change. Returns `None` if exact arithmetic exceeds its budget, or if the caller has
+/// cancelled the computation.
 ///
 /// All operands are nonnegative, so each step increases the relative error of a value by a
 /// bounded amount.
@@ -31,11 +32,13 @@ pub fn apply<N: Number>(
     problem: Problem<'_, N>,
     mut values: Vec<N>,
     steps: u32,
-    work: &mut Work,
+    work: &mut Work<'_>,
 ) -> Option<Stepped<N>> {
     let mdp = problem.mdp;
     let (mut widest, mut lost) = (1, false);
     for _ in 0..steps {
+        // Exploration of a tiny process ends at once, but its steps can take hours.
+        work.poll(mdp.transition_count())?;
         let mut next = values.clone();
         for state in (0..mdp.states()).filter(|state| !problem.is_sink(*state)) {
             let mut best: Option<N> = None;

@@ -1,6 +1,6 @@
 //! Compiles expressions of the syntax tree: resolves names, infers types, and evaluates constants.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use num_rational::BigRational;
 use rustc_hash::FxHashMap;
@@ -32,9 +32,11 @@ pub struct Names {
 }
 
 /// Upper limit on the nesting depth of an expression, with formulas expanded.
-const MAX_DEPTH: usize = 250;
+pub const MAX_DEPTH: usize = 250;
 /// Upper limits on the number of subexpressions: in one top-level expression, and in all expressions together.
-const MAX_PARTS: [usize; 2] = [200_000, 5_000_000];
+pub const MAX_PARTS: [usize; 2] = [200_000, 5_000_000];
+/// The message about an expression beyond [`MAX_DEPTH`] or [`MAX_PARTS`].
+pub const TOO_LARGE: &str = "after the expansion of its formulas, this is nested too deeply or too large";
 
 /// The values of constants that the user sets, as text, by name. They override values in the model.
 pub type Settings = BTreeMap<String, String>;
@@ -76,6 +78,8 @@ impl Names {
         let mut missing = Vec::new();
         // A constant may use constants declared after it. Each round evaluates the constants that use no constant
         // without a value. A round without progress means that some of the remaining constants depend on each other.
+        // Rounds alternate in direction, so that constants in reverse order of dependency need two rounds.
+        let declared: HashSet<&str> = model.constants.iter().map(|constant| constant.name.as_str()).collect();
         let mut waiting: Vec<_> = model.constants.iter().collect();
         while !waiting.is_empty() {
             let before = waiting.len();
@@ -89,7 +93,7 @@ impl Names {
                         zero(constant.kind)
                     }
                     (None, Some(value)) => {
-                        if names.has_undefined(value, model) {
+                        if names.has_undefined(value, model, &declared) {
                             next.push(constant);
                             continue;
                         }
@@ -105,8 +109,10 @@ impl Names {
                 let meaning = Meaning::Constant(code, constant.kind);
                 names.declare(&constant.name, meaning, constant.place, &mut problems);
             }
+            next.reverse();
             waiting = next;
             if waiting.len() == before {
+                waiting.sort_by_key(|constant| (constant.place.line, constant.place.column));
                 for constant in waiting.drain(..) {
                     let text = format!("the value of `{}` depends on itself", constant.name);
                     problems.push(Diagnostic::new("Q204", constant.place, text));
@@ -123,14 +129,13 @@ impl Names {
     }
 
     /// Returns `true` if an expression uses a constant that has no value yet, directly or through formulas.
-    fn has_undefined(&self, value: &Expr, model: &Model) -> bool {
+    fn has_undefined(&self, value: &Expr, model: &Model, declared: &HashSet<&str>) -> bool {
         let mut used = Vec::new();
         value.names(&mut used);
         let mut has_undefined = false;
         for at in 0.. {
             let Some((name, _)) = used.get(at).copied() else { break };
-            has_undefined |=
-                !self.meanings.contains_key(name) && model.constants.iter().any(|c| c.name == name);
+            has_undefined |= !self.meanings.contains_key(name) && declared.contains(name);
             if let Some(formula) = model.formulas.iter().find(|formula| formula.name == name)
                 && !used[..at].iter().any(|(earlier, _)| *earlier == name)
             {
@@ -210,8 +215,7 @@ impl Names {
         self.parts = self.parts.map(|parts| parts + 1);
         if self.depth > MAX_DEPTH || self.parts.iter().zip(MAX_PARTS).any(|(parts, most)| *parts > most) {
             self.depth -= 1;
-            let text = "after the expansion of its formulas, this is nested too deeply or too large";
-            return Err(Diagnostic::new("Q104", expression.place, text));
+            return Err(Diagnostic::new("Q104", expression.place, TOO_LARGE));
         }
         let compiled = self.kind(expression);
         self.depth -= 1;

@@ -26,8 +26,8 @@ mod state;
 mod write;
 
 pub(crate) use code::Code;
-pub(crate) use compile::Names;
 pub use compile::Settings;
+pub(crate) use compile::{Names, TOO_LARGE};
 pub use model::Program;
 pub use parser::parse;
 pub(crate) use parser::{constant_declaration, named_expression};

@@ -247,7 +247,7 @@ fn module(
             let text = format!("there is no module `{original}` above");
             return Err(Diagnostic::new("Q201", original_place, text));
         };
-        let module = rename::module(original_module, &name, place, &pairs, formulas);
+        let module = rename::module(original_module, &name, place, &pairs, formulas)?;
         model.modules.push(module);
         return Ok(());
     }

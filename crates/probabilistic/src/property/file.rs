@@ -53,11 +53,13 @@ pub fn parse_file(text: &str) -> Result<File, Error> {
     let tokens = tokens(text).map_err(|problems| Error::Property(problems.into()))?;
     let mut cursor = Cursor::for_properties(&tokens, PROPERTY_SYNTAX);
     let (mut file, mut problems) = (File::default(), Vec::new());
+    let ends = text.match_indices('\n').map(|(at, _)| at.saturating_add(1));
+    let lines: Vec<usize> = std::iter::once(0).chain(ends).collect();
     while *cursor.peek() != Kind::End {
         if cursor.take(";") {
             continue;
         }
-        if let Err(problem) = entry(&mut cursor, text, &mut file) {
+        if let Err(problem) = entry(&mut cursor, (text, &lines), &mut file) {
             problems.push(problem);
             cursor.reset();
             while !cursor.is(";") && *cursor.peek() != Kind::End {
@@ -68,7 +70,7 @@ pub fn parse_file(text: &str) -> Result<File, Error> {
     if problems.is_empty() { Ok(file) } else { Err(Error::Property(problems.into())) }
 }
 
-fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
+fn entry(cursor: &mut Cursor<'_>, (text, lines): (&str, &[usize]), file: &mut File) -> Read<()> {
     if cursor.is_word("const") {
         file.declarations.constants.push(constant_declaration(cursor)?);
         return Ok(());
@@ -84,7 +86,7 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
         cursor.advance();
     }
     let place = cursor.place();
-    let begin = position(text, place);
+    let begin = position(text, lines, place);
     let start = cursor.position();
     let property = match property(cursor) {
         // An unsupported property is skipped, so that the other properties can still be checked.
@@ -95,7 +97,7 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
         }
         read => read?,
     };
-    let end = if *cursor.peek() == Kind::End { text.len() } else { position(text, cursor.place()) };
+    let end = if *cursor.peek() == Kind::End { text.len() } else { position(text, lines, cursor.place()) };
     // A comment after the property is not part of its source text.
     let source = text[begin..end].split("//").next().unwrap_or("").trim().to_owned();
     if let Some(name) = &name {
@@ -124,9 +126,9 @@ fn skip_property(cursor: &mut Cursor<'_>) {
     }
 }
 
-fn position(text: &str, place: Place) -> usize {
-    let lines = text.split_inclusive('\n').take(place.line.saturating_sub(1));
-    let before = lines.map(str::len).fold(0, usize::saturating_add);
+/// Returns the byte offset of a place in a text. `lines` are the offsets of its lines.
+fn position(text: &str, lines: &[usize], place: Place) -> usize {
+    let before = lines.get(place.line.saturating_sub(1)).copied().unwrap_or(text.len());
     let line = &text[before..];
     let within = line.char_indices().nth(place.column.saturating_sub(1)).map_or(line.len(), |(at, _)| at);
     before.saturating_add(within)

@@ -181,7 +181,7 @@ impl<N: Number> Chain<'_, N> {
 
     /// Computes the expected cost from each state of the chain until the run leaves the chain. Returns
     /// `None` if a set of states is never left, or if a limit on the work is exceeded.
-    pub fn solve(&self, work: &mut Work) -> Option<Solved<N>> {
+    pub fn solve(&self, work: &mut Work<'_>) -> Option<Solved<N>> {
         let order = components(self.policy.len(), |state| self.targets(state as usize));
         let mut values = vec![N::zero(); self.policy.len()];
         let mut relative = vec![0.0_f64; self.policy.len()];
@@ -248,7 +248,7 @@ fn eliminate<N: Number>(
     chain: &Chain<'_, N>,
     component: &[u32],
     values: &mut [N],
-    budget: &mut Work,
+    budget: &mut Work<'_>,
 ) -> Option<Precision> {
     let mut members: Vec<u32> = component.to_vec();
     members.sort_unstable();
@@ -334,7 +334,7 @@ fn fill<N>(rows: &[Row<N>], users: &[Vec<u32>], state: u32) -> usize {
 /// Eliminates the self-loop of a row: divides its other entries, its constant and its leaving
 /// probability by the probability of not looping. Returns `None` if the row only loops, or if exact
 /// arithmetic exceeds its budget.
-fn normalise<N: Number>(row: &mut Row<N>, diagonal: u32, budget: &mut Work) -> Option<()> {
+fn normalise<N: Number>(row: &mut Row<N>, diagonal: u32, budget: &mut Work<'_>) -> Option<()> {
     let Ok(at) = row.entries.binary_search_by_key(&diagonal, |(column, _)| *column) else { return Some(()) };
     row.entries.remove(at);
     let leaves = row.entries.iter().fold(row.leaving.clone(), |sum, (_, p)| sum.plus(p));
@@ -359,7 +359,7 @@ fn substitute<N: Number>(
     row: &Row<N>,
     user: u32,
     users: &mut [Vec<u32>],
-    budget: &mut Work,
+    budget: &mut Work<'_>,
 ) -> Option<bool> {
     let Ok(at) = target.entries.binary_search_by_key(&pivot, |(column, _)| *column) else {
         return Some(false);

@@ -196,6 +196,9 @@ impl<N: Number> Run<'_, N> {
             None if self.draft => None,
             iterated => doubles::enclosed(&quotient, iterated, direction, &mut self.work),
         };
+        if self.work.is_cancelled() {
+            return None;
+        }
         let Some(Enclosed { policy, values, errors }) = enclosure else {
             self.mark_unknown(local);
             return Some(());

@@ -30,10 +30,10 @@ pub fn enclosed<N: Number>(
     quotient: &Quotient<N>,
     iterated: Option<Iterated<N>>,
     direction: Direction,
-    work: &mut Work,
+    work: &mut Work<'_>,
 ) -> Option<Enclosed<N>> {
     let tight = work.tight;
-    let Some(mut iterated) = iterated else { return interval::enclose(quotient, direction, tight) };
+    let Some(mut iterated) = iterated else { return interval::enclose(quotient, direction, work) };
     let is_chain = (0..quotient.blocks()).all(|block| quotient.range(block).len() <= 1);
     if !is_chain {
         // These errors refer to the values of the computed policy, which may not be optimal if there are
@@ -79,7 +79,7 @@ pub fn enclosed<N: Number>(
     }
     improved
         .or_else(|| interval::around(quotient, &rounded.values, direction, tight))
-        .or_else(|| interval::enclose(quotient, direction, tight))
+        .or_else(|| interval::enclose(quotient, direction, work))
         .or(Some(rounded))
 }
 
@@ -119,7 +119,7 @@ fn in_rationals<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],
     direction: Direction,
-    work: &mut Work,
+    work: &mut Work<'_>,
 ) -> Option<Enclosed<N>> {
     let rational = Quotient {
         first: quotient.first.clone(),

@@ -17,6 +17,7 @@ use crate::solve::local::NONE;
 use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::users::{Users, owners};
+use crate::solve::work::Work;
 
 /// An almost optimal policy, with the values of the blocks (merged end components) and bounds on
 /// their errors.
@@ -38,12 +39,16 @@ const INITIAL_SHARE: f64 = 0.45;
 /// Maximum number of sweeps over the rows of a fixed policy between two sweeps over all rows.
 const POLICY_SWEEPS: usize = 25;
 
-/// Computes bounds on the values of all blocks (merged end components) with a width of about `width` times the
-/// value. Returns `None` if the work limit is exceeded.
-pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f64) -> Option<Enclosed<N>> {
+/// Computes bounds on the values of all blocks (merged end components) with about the required width
+/// ([`Work::tight`]). Returns `None` if [`MAX_WORK`] is exceeded, or if the caller has cancelled the computation.
+pub fn enclose<N: Number>(
+    quotient: &Quotient<N>,
+    direction: Direction,
+    work: &mut Work<'_>,
+) -> Option<Enclosed<N>> {
     let sorted = Sorted::new(quotient);
     let rows = sorted.rows(quotient, direction);
-    let (lower, upper) = rows.iterated(width)?;
+    let (lower, upper) = rows.iterated(work)?;
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
@@ -213,20 +218,25 @@ impl<'a, N: Number> Rows<'a, N> {
     }
 
     /// Computes lower bounds by iteration from zero, and upper bounds by increasing the lower bounds slightly
-    /// until no equation raises the result. Returns `None` if the work limit is exceeded.
-    fn iterated(&self, width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    /// until no equation raises the result. Returns `None` if [`MAX_WORK`] is exceeded, or if the caller has
+    /// cancelled the computation.
+    fn iterated(&self, polled: &mut Work<'_>) -> Option<(Vec<f64>, Vec<f64>)> {
+        let width = polled.tight;
         let (down, up) = (1.0 - self.rounding, 1.0 + self.rounding);
-        let sweep_work = self.columns.len().saturating_add(self.constants.len()) as u64;
+        let entries = self.columns.len().saturating_add(self.constants.len());
+        let sweep_work = entries as u64;
         let mut lower = vec![0.0_f64; self.positions()];
         let mut policy = vec![NONE; self.positions()];
         let (mut work, mut threshold) = (0_u64, width * 0.05);
         while work < MAX_WORK {
             loop {
+                polled.poll(entries)?;
                 let mut change = self.sweep(&mut lower, &mut policy, down);
                 work = work.saturating_add(sweep_work);
                 // For maximisation, the values of any policy are lower bounds, and sweeps over a
                 // single policy are cheaper.
                 if self.direction == Direction::Max && change > threshold {
+                    polled.poll(entries.saturating_mul(POLICY_SWEEPS))?;
                     for _ in 0..POLICY_SWEEPS {
                         let (growth, evaluated) = self.follow(&mut lower, &policy, down);
                         work = work.saturating_add(evaluated);
@@ -247,6 +257,7 @@ impl<'a, N: Number> Rows<'a, N> {
             let mut upper: Vec<f64> = lower.iter().map(|value| value * (1.0 + width * 0.5)).collect();
             for _ in 0..UPPER_SWEEPS {
                 work = work.saturating_add(sweep_work);
+                polled.poll(entries)?;
                 if !self.raises(&mut upper, up) {
                     return Some((lower, upper));
                 }
@@ -370,7 +381,6 @@ mod tests {
     use super::*;
     use crate::solve::certify::certify;
     use crate::solve::chain;
-    use crate::solve::work::Work;
 
     fn square(side: u32) -> Quotient<f64> {
         let mut quotient =
@@ -398,7 +408,7 @@ mod tests {
     fn bounds_enclose_the_values_of_elimination() {
         for direction in [Direction::Min, Direction::Max] {
             let quotient = square(12);
-            let enclosed = enclose(&quotient, direction, 1e-7).expect("it converges");
+            let enclosed = enclose(&quotient, direction, &mut Work::new(0)).expect("it converges");
             let chain = chain::Chain { rows: &quotient.rows, policy: &enclosed.policy, costs: None };
             let values = chain.solve(&mut Work::new(0)).expect("each place is left").values;
             let exact = certify(&quotient, &enclosed.policy, &values, direction);

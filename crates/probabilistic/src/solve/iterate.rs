@@ -39,12 +39,13 @@ pub struct Iterated<N> {
 
 /// Performs policy iteration from the policy `start`, which must lead from every block (merged end
 /// component) out of the component with probability 1. Returns `None` if the chain of a policy
-/// cannot be solved within the limits, or if exact arithmetic exceeds its budget or [`MAX_EXACT_ROUNDS`].
+/// cannot be solved within the limits, if exact arithmetic exceeds its budget or [`MAX_EXACT_ROUNDS`], or if the
+/// caller has cancelled the computation.
 pub fn iterate<N: Number>(
     quotient: &Quotient<N>,
     start: Vec<u32>,
     direction: Direction,
-    work: &mut Work,
+    work: &mut Work<'_>,
 ) -> Option<Iterated<N>> {
     let mut policy = start;
     let mut touched = work.touched();
@@ -52,6 +53,7 @@ pub fn iterate<N: Number>(
     let large = !N::EXACT && quotient.blocks() >= SWEEP_MIN_BLOCKS;
     let (rounds, mut is_stable) = (if N::EXACT { MAX_EXACT_ROUNDS } else { MAX_ROUNDS }, false);
     for _ in 0..rounds {
+        work.poll(quotient.rows.columns.len())?;
         let mut improved = false;
         // The sweeps may take about as long as the last elimination. Without fill-in, elimination is fast, so
         // there are few sweeps.
@@ -75,7 +77,7 @@ pub fn iterate<N: Number>(
     (is_stable || !N::EXACT).then_some(Iterated { policy, values, relative })
 }
 
-fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32], work: &mut Work) -> Option<Solved<N>> {
+fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32], work: &mut Work<'_>) -> Option<Solved<N>> {
     Chain { rows: &quotient.rows, policy, costs: None }.solve(work)
 }
 
@@ -88,7 +90,7 @@ fn improve<N: Number>(
     values: &mut [N],
     direction: Direction,
     sweep: bool,
-    work: &mut Work,
+    work: &mut Work<'_>,
 ) -> Option<bool> {
     let mut changed = false;
     let old: Option<Vec<N>> = (!sweep).then(|| values.to_vec());

@@ -52,15 +52,15 @@ pub fn solve<N: Number>(problem: Problem<'_, N>, hint: Option<&[u32]>) -> Option
 }
 
 /// Solves a problem within the given budget of exact arithmetic. Returns `None` if the budget is
-/// exceeded.
+/// exceeded, or if the caller has cancelled the computation.
 pub(crate) fn solve_within<N: Number>(
     problem: Problem<'_, N>,
     hint: Option<&[u32]>,
-    work: &mut Work,
+    work: &mut Work<'_>,
 ) -> Option<Solution<N>> {
     let mut run = Run { work: *work, ..begin(problem, hint) };
     let outcome = run.solve_components();
-    *work = run.work;
+    work.continue_from(&run.work);
     outcome.map(|()| run.solution)
 }
 
@@ -96,7 +96,7 @@ fn begin<'a, N: Number>(problem: Problem<'a, N>, hint: Option<&'a [u32]>) -> Run
 
 impl<N: Number> Run<'_, N> {
     /// Solves all strongly connected components, each after its successors. Returns `None` if exact
-    /// arithmetic exceeds its budget.
+    /// arithmetic exceeds its budget, or if the caller has cancelled the computation.
     fn solve_components(&mut self) -> Option<()> {
         let (mut local, mut path_buffers) = (local::Local::new(), ways::PathBuffers::default());
         let problem = self.problem;
@@ -110,7 +110,8 @@ impl<N: Number> Run<'_, N> {
                 _ if self.shortest_paths(component, &mut path_buffers) => {}
                 _ => self.component(component, &mut local).ok_or(TooMuchWork)?,
             }
-            if N::EXACT && self.work.is_spent() { Err(TooMuchWork) } else { Ok(()) }
+            let is_spent = N::EXACT && self.work.is_spent();
+            if is_spent || self.work.poll(component.len()).is_none() { Err(TooMuchWork) } else { Ok(()) }
         });
         visited.ok()
     }

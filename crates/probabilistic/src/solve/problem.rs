@@ -126,7 +126,7 @@ pub(crate) struct Run<'a, N> {
     pub hint: Option<&'a [u32]>,
     /// The local number of each state in the current component, or [`NONE`] outside the component.
     pub position: Vec<u32>,
-    pub work: Work,
+    pub work: Work<'a>,
     /// Whether only a good policy is needed; errors are then not bounded.
     pub draft: bool,
 }

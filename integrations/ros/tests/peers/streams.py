@@ -92,12 +92,3 @@ def stream(experiment: int, number: int) -> Stream:
 def published() -> list[Stream]:
     """Returns all eighteen published streams."""
     return [stream(experiment, number) for experiment in (1, 2, 3) for number in range(1, DRAWS + 1)]
-
-
-def battery_run() -> Stream:
-    """Returns our own stream: at second 31, during the search in clear water, the battery falls below a quarter."""
-    found = []
-    for second in range(60):
-        found.append(Stimulus(second, "visibility", HIGHEST))
-        found.append(Stimulus(second, "battery", 1.0 - second / 40))
-    return Stream(0, 1, tuple(s for s in found if s.kind != "battery" or s.value > 0.15))
