@@ -15,7 +15,7 @@ use tempfile::TempDir;
 use tokio::sync::{broadcast, watch};
 use tokio::task::JoinHandle;
 
-use super::common::read;
+use super::common::{has_no_events, read};
 use super::scripts;
 
 pub(super) const ENROL: &str = r#"{"event": "enrol", "mission": "ugv"}"#;
@@ -33,7 +33,7 @@ const LIMIT: Duration = Duration::from_secs(600);
 
 /// Settings with which each decision contains its plan, so that the answers do not depend on the speed of this machine.
 pub(super) fn patient() -> Settings {
-    Settings { patience: LIMIT, look: Duration::from_millis(1), ..Settings::default() }
+    Settings { patience: LIMIT, ..Settings::default() }
 }
 
 pub(super) fn shared<S: Store>(store: S, name: &str, settings: Settings) -> Arc<Shared<S>> {
@@ -125,12 +125,7 @@ impl Fleet {
     /// Returns `true` if there are no events. Unlike [`all`](Self::all), it does not wait for events that are discarded
     /// meanwhile.
     pub(super) async fn has_no_events(&self) -> bool {
-        for partition in 0..self.store.partitions() {
-            if self.store.end(Stream::Events, partition).await.expect("it can be read") > 0 {
-                return false;
-            }
-        }
-        true
+        has_no_events(&self.store).await.expect("it can be read")
     }
 
     /// Waits until all events are handled, their plans are found, and the events are discarded.
@@ -143,12 +138,12 @@ impl Fleet {
         until(&what, async || self.all(Stream::Decisions).await.len() >= count).await;
     }
 
-    pub(super) fn own(&self, name: &str, settings: Settings) -> Owner {
-        Owner::start(shared(self.store.clone(), name, settings))
+    pub(super) fn own(&self, name: &str, settings: Settings) -> Running {
+        Running::owner(shared(self.store.clone(), name, settings))
     }
 
     pub(super) async fn work(&self, name: &str, settings: Settings, count: usize) {
-        let worker = Worker::start(shared(self.store.clone(), name, settings));
+        let worker = Running::worker(shared(self.store.clone(), name, settings));
         self.decided(count).await;
         worker.stop().await;
     }
@@ -192,42 +187,29 @@ impl Client {
     }
 }
 
-/// An owner of the first partition, which is aborted at the end.
-pub(super) struct Owner(watch::Sender<bool>, JoinHandle<()>);
+/// A running worker, or an owner of the first partition only, which is aborted when it is dropped.
+pub(super) struct Running(watch::Sender<bool>, JoinHandle<()>);
 
-impl Owner {
-    pub(super) fn start<S: Store>(shared: Arc<Shared<S>>) -> Self {
+impl Running {
+    pub(super) fn worker<S: Store>(shared: Arc<Shared<S>>) -> Self {
+        let (stop, stopped) = watch::channel(false);
+        Self(stop, tokio::spawn(worker::run(shared, stopped)))
+    }
+
+    pub(super) fn owner<S: Store>(shared: Arc<Shared<S>>) -> Self {
         let (drain, receiver) = watch::channel(false);
         Self(drain, tokio::spawn(serve(shared, 0, receiver)))
     }
 
-    pub(super) async fn drain(mut self) {
+    pub(super) async fn stop(mut self) {
         self.0.send_replace(true);
         let end = tokio::time::timeout(LIMIT, &mut self.1).await;
         end.expect("it ends in time").expect("no panic");
     }
 }
 
-impl Drop for Owner {
+impl Drop for Running {
     fn drop(&mut self) {
         self.1.abort();
-    }
-}
-
-pub(super) struct Worker(watch::Sender<bool>, JoinHandle<()>);
-
-impl Worker {
-    pub(super) fn start<S: Store>(shared: Arc<Shared<S>>) -> Self {
-        let (stop, stopped) = watch::channel(false);
-        Self(stop, tokio::spawn(worker::run(shared, stopped)))
-    }
-
-    pub(super) fn abort(self) {
-        self.1.abort();
-    }
-
-    pub(super) async fn stop(self) {
-        self.0.send_replace(true);
-        self.1.await.expect("a worker ends in order");
     }
 }

@@ -51,7 +51,8 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
     }
     let mut random = fastrand::Rng::with_seed(5);
     for owner in 0..100 {
-        let settings = Settings { discard_every: random.usize(1..5), warm: 3, ..hasty(random.u64(..3)) };
+        let patience = [0, 1, 2, 600_000][random.usize(..4)];
+        let settings = Settings { discard_every: random.usize(1..12), warm: 3, ..hasty(patience) };
         let _owner = fleet.own("owner", settings);
         // Later owners live longer, so that they also find plans on a slow machine.
         tokio::time::sleep(Duration::from_millis(random.u64(1..150) + owner * owner / 50)).await;

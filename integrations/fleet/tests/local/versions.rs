@@ -16,7 +16,7 @@ use metaplan_fleet::store::{Message, Stored, Stream};
 use metaplan_fleet::wire::{Decided, State};
 use tempfile::TempDir;
 
-use super::harness::{Client, ENROL, Fleet, LOST, Owner, RETIRE, TICK, Worker, event, heard, patient, until};
+use super::harness::{Client, ENROL, Fleet, LOST, RETIRE, Running, TICK, event, heard, patient, until};
 use super::scripts;
 
 /// A fleet with one partition, and directories with two versions of the mission `ugv`: the original, and one with a
@@ -55,14 +55,14 @@ impl Versions {
     }
 
     async fn work(&self, names: &[&str], count: usize) {
-        let worker = Worker::start(self.shared(names));
+        let worker = Running::worker(self.shared(names));
         self.fleet.decided(count).await;
         worker.stop().await;
     }
 
     async fn refuse(&self, names: &[&str], count: u64) {
         let shared = self.shared(names);
-        let worker = Worker::start(Arc::clone(&shared));
+        let worker = Running::worker(Arc::clone(&shared));
         until("refusals", async || shared.counts.refused.load(Ordering::Relaxed) >= count).await;
         worker.stop().await;
     }
@@ -96,7 +96,7 @@ async fn a_robot_without_its_version_waits_for_it_and_delays_nobody() {
     robot.send(fleet, 10).await;
     versions.work(&["old"], 10).await;
     robot.send(fleet, 15).await;
-    let worker = Worker::start(versions.shared(&["new"]));
+    let worker = Running::worker(versions.shared(&["new"]));
     other.send(fleet, 10).await;
     fleet.decided(20).await;
     // These events reach a robot that is suspended already.
@@ -253,13 +253,13 @@ async fn owners_with_different_versions_agree_on_what_was_decided() {
                 events.push(event);
             }
             texts.extend(versions.fleet.tell("r", &events).await.into_iter().zip(events));
-            let _owner = Owner::start(Arc::clone(&shared[random.usize(..4)]));
+            let _owner = Running::owner(Arc::clone(&shared[random.usize(..4)]));
             tokio::time::sleep(Duration::from_millis(random.u64(1..60))).await;
         }
         let end = [RETIRE, ENROL, TICK];
         texts.extend(versions.fleet.tell("r", &end).await.into_iter().zip(end));
         let last = texts.last_key_value().map(|(sequence, _)| *sequence);
-        let worker = Worker::start(versions.shared(&["new", "old"]));
+        let worker = Running::worker(versions.shared(&["new", "old"]));
         let is_over = async || versions.fleet.of("r").await.last().map(|decided| decided.event) == last;
         until("the last event is not decided", is_over).await;
         worker.stop().await;
@@ -274,7 +274,7 @@ async fn only_ids_are_kept_of_retired_robots() {
     let mut count = 0;
     for _ in 0..2 {
         let shared = versions.shared(&["old"]);
-        let worker = Worker::start(Arc::clone(&shared));
+        let worker = Running::worker(Arc::clone(&shared));
         for robot in ["a", "b", "c"] {
             count += fleet.tell(robot, &[ENROL, TICK, RETIRE]).await.len();
         }
