@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use futures::future::{BoxFuture, FutureExt as _};
 use metaplan::mapek::{ParallelSearch, SearchHandle, Thinker, Thoughts};
 use tokio::sync::watch;
+use tokio::task::JoinSet;
 
 use super::own::Inbox;
 use super::{Shared, pause, persist};
@@ -71,7 +71,7 @@ type Plans = Option<(Thoughts, Duration)>;
 /// A search for a plan that continues after the decision.
 struct Planning {
     search: SearchHandle,
-    plans: BoxFuture<'static, Plans>,
+    plans: JoinSet<Plans>,
 }
 
 pub(super) struct Runner<S> {
@@ -89,7 +89,7 @@ pub(super) struct Runner<S> {
     is_suspended: bool,
     /// The search that continues after the decision, and its plans.
     search: ParallelSearch,
-    plans: Option<BoxFuture<'static, Plans>>,
+    plans: JoinSet<Plans>,
     /// Estimated duration of the robot's next search, if it has searched before.
     estimate: Option<Duration>,
     /// Sequence number of the last event that was decided or refused.
@@ -114,7 +114,7 @@ impl<S: Store> Runner<S> {
             is_kept: false,
             is_suspended: false,
             search: ParallelSearch::default(),
-            plans: None,
+            plans: JoinSet::new(),
             estimate: None,
             handled: 0,
             obsolete: 0,
@@ -127,7 +127,7 @@ impl<S: Store> Runner<S> {
     /// true. Discards handled events when they are due.
     pub(super) async fn run(mut self: Box<Self>, mut drain: watch::Receiver<bool>) -> Box<Self> {
         while !self.is_obsolete() {
-            if self.pending.is_some() && self.plans.is_none() && self.inbox.is_empty() {
+            if self.pending.is_some() && self.plans.is_empty() && self.inbox.is_empty() {
                 let outcome = self.start_planning().await;
                 self.register(None, outcome);
                 continue;
@@ -139,7 +139,7 @@ impl<S: Store> Runner<S> {
             tokio::select! {
                 biased;
                 () = drained(&mut drain) => break,
-                plans = join(plans) => self.conclude(plans).await,
+                Some(plans) = join(plans) => self.conclude(plans).await,
                 () = until(discard_at) => {}
                 event = inbox.next(&shared.store, subject, decided) => self.handle(event).await,
                 () = until(unload_at) => self.loaded = None,
@@ -162,7 +162,7 @@ impl<S: Store> Runner<S> {
         if *drain.borrow() {
             // The next owner plans.
             self.search.interrupt();
-            self.plans = None;
+            self.plans = JoinSet::new();
             if self.obsolete > 0 {
                 self.discard().await;
             }
@@ -171,7 +171,7 @@ impl<S: Store> Runner<S> {
     }
 
     fn is_idle(&self) -> bool {
-        self.inbox.is_empty() && self.pending.is_none() && self.plans.is_none()
+        self.inbox.is_empty() && self.pending.is_none() && self.plans.is_empty()
     }
 
     /// Returns `true` if nothing has to be kept in memory.
@@ -221,7 +221,7 @@ impl<S: Store> Runner<S> {
 
     /// Returns the decision about an event, and the search that continues if the decision lacks a plan.
     async fn decision(&mut self, event: &Stored) -> Result<(Decided, Option<Planning>), Outcome> {
-        let (event, may_search) = (event.clone(), self.plans.is_none());
+        let (event, may_search) = (event.clone(), self.plans.is_empty());
         let begin = move |robot: &mut Robot, missions: &Missions| {
             let begun = robot.begin(&event, missions);
             let thinker = match &begun {
@@ -241,7 +241,7 @@ impl<S: Store> Runner<S> {
         if let Some(Planning { plans, .. }) = &mut planning
             // `timeout` with zero would accept the result of a search that ends within its first millisecond.
             && !patience.is_zero()
-            && let Ok(plans) = tokio::time::timeout(patience, plans).await
+            && let Ok(Some(plans)) = tokio::time::timeout(patience, join(plans)).await
         {
             let (result, estimate) = plans.ok_or_else(panicked)?;
             (thoughts, self.estimate, planning) = (Some(result), Some(estimate), None);
@@ -273,19 +273,20 @@ impl<S: Store> Runner<S> {
             let think = move || timing.timed(|| thinker.think());
             shared.threads.search(&mission, estimate, think).await
         };
-        Planning { search, plans: plans.boxed() }
+        // A task of its own, because a search holds a place, which it has to give up also while its robot waits for the log.
+        Planning { search, plans: [plans].into_iter().collect() }
     }
 
     fn follow(&mut self, planning: Option<Planning>) {
         if let Some(Planning { search, plans }) = planning {
             self.search.begin(search);
-            self.plans = Some(plans);
+            self.plans = plans;
         }
     }
 
     /// Publishes the plans of the search in a decision that completes the decisions without a plan.
     async fn conclude(&mut self, plans: Plans) {
-        (self.plans, self.used) = (None, Instant::now());
+        self.used = Instant::now();
         let is_cancelled = self.search.end();
         let Some((thoughts, estimate)) = plans else { return self.suspend(PANICKED) };
         if is_cancelled || self.loaded.is_none() {
@@ -435,12 +436,9 @@ impl<S: Store> Runner<S> {
     }
 }
 
-/// Waits for the plans of a search. Never completes without a search.
-async fn join(plans: &mut Option<BoxFuture<'static, Plans>>) -> Plans {
-    match plans {
-        Some(plans) => plans.await,
-        None => std::future::pending().await,
-    }
+/// Waits for the plans of a search. Returns `None` without a search.
+async fn join(plans: &mut JoinSet<Plans>) -> Option<Plans> {
+    Some(plans.join_next().await?.ok().flatten())
 }
 
 /// Waits until a time. Never completes without one.
@@ -489,7 +487,7 @@ mod tests {
         store.append(Stream::Events, message).await.expect("it is the first one");
         let settings = Settings { discard_within: Duration::from_millis(10), ..Settings::default() };
         let mut runner = runner(store.clone(), missions(), settings);
-        runner.plans = Some(std::future::pending().boxed());
+        runner.plans.spawn(std::future::pending());
         runner.inbox.push(store.next("0.r", 0).await.expect("it can be read").expect("it exists"));
         let (_drain, drain) = watch::channel(false);
         let run = tokio::spawn(Box::new(runner).run(drain));

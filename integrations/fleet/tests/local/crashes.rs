@@ -6,13 +6,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use delegate::delegate;
 use metaplan_fleet::partition::Settings;
 use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::{Fault, Message, Receipt, Store, Stored, Stream, Subscription};
 use metaplan_fleet::wire::Presence;
 use tokio::sync::Notify;
 
-use super::harness::{Client, Fleet, Running, TICK, patient, shared};
+use super::harness::{Client, ENROL, Fleet, Running, TICK, patient, shared, until};
 
 /// A log that stops responding after a number of operations, as if the worker had crashed. The last
 /// operation is executed without an acknowledgement if `carries_out` is set.
@@ -23,6 +24,8 @@ struct Crashing {
     carries_out: bool,
     /// `false` to omit the comparison of decisions with their required predecessors.
     fences: bool,
+    /// Subject of a robot whose second decision is never acknowledged.
+    stuck: &'static str,
     /// Number of attempts to discard events that still fail.
     failing: Arc<AtomicU64>,
     over: Arc<Notify>,
@@ -31,8 +34,8 @@ struct Crashing {
 impl Crashing {
     fn new(fleet: &Fleet, operations: u64) -> Self {
         let (inner, operations) = (fleet.store.clone(), Arc::new(operations.into()));
-        let (carries_out, fences) = (false, true);
-        Self { inner, operations, carries_out, fences, failing: Arc::default(), over: Arc::default() }
+        let (failing, over) = (Arc::default(), Arc::default());
+        Self { inner, operations, carries_out: false, fences: true, stuck: "", failing, over }
     }
 
     /// Counts an operation, and executes it if the limit is not reached. Otherwise the returned
@@ -53,23 +56,25 @@ fn decrement(counter: &AtomicU64) -> Result<u64, u64> {
 }
 
 impl Store for Crashing {
-    fn partitions(&self) -> u32 {
-        self.inner.partitions()
-    }
-
-    fn lease(&self) -> Duration {
-        self.inner.lease()
+    delegate! {
+        to self.inner {
+            fn partitions(&self) -> u32;
+            fn lease(&self) -> Duration;
+            async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault>;
+            async fn announce(&self, worker: &str, status: Option<&Presence>) -> Result<(), Fault>;
+            async fn workers(&self) -> Result<BTreeMap<String, Presence>, Fault>;
+            async fn notice(&self, subject: &str, text: &str);
+        }
     }
 
     async fn follow(&self, stream: Stream, partition: u32, after: u64) -> Result<Subscription, Fault> {
         self.through(self.inner.follow(stream, partition, after)).await
     }
 
-    async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault> {
-        self.inner.end(stream, partition).await
-    }
-
     async fn append(&self, stream: Stream, mut message: Message<'_>) -> Result<Receipt, Fault> {
+        if message.subject == self.stuck && message.after > Some(0) {
+            std::future::pending::<()>().await;
+        }
         if !self.fences {
             message.after = None;
         }
@@ -89,18 +94,6 @@ impl Store for Crashing {
 
     async fn next(&self, subject: &str, start: u64) -> Result<Option<Stored>, Fault> {
         self.through(self.inner.next(subject, start)).await
-    }
-
-    async fn announce(&self, worker: &str, status: Option<&Presence>) -> Result<(), Fault> {
-        self.inner.announce(worker, status).await
-    }
-
-    async fn workers(&self) -> Result<BTreeMap<String, Presence>, Fault> {
-        self.inner.workers().await
-    }
-
-    async fn notice(&self, subject: &str, text: &str) {
-        self.inner.notice(subject, text).await;
     }
 }
 
@@ -200,4 +193,17 @@ async fn a_drain_does_not_wait_for_jobs_without_end_and_events_are_discarded_aft
         fleet.settle().await;
         robot.verify(&fleet).await;
     }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_search_gives_up_its_place_while_its_robot_waits_for_the_log() {
+    let fleet = Fleet::new(1);
+    let settings = Settings { threads: 1, patience: Duration::ZERO, ..patient() };
+    let crashing = Crashing { stuck: "0.stuck", ..Crashing::new(&fleet, u64::MAX) };
+    let _owner = Running::owner(shared(crashing, "first", settings));
+    fleet.tell("stuck", &[ENROL, TICK]).await;
+    fleet.decided(1).await;
+    fleet.tell("r", &[ENROL]).await;
+    let has_plan = async || fleet.of("r").await.iter().any(|decided| decided.planned);
+    until("the place is not free", has_plan).await;
 }

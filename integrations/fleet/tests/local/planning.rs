@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use metaplan_fleet::partition::Settings;
 use metaplan_fleet::robot::{Begun, Robot};
-use metaplan_fleet::store::{Message, Store as _, Stream};
+use metaplan_fleet::store::{Message, Store as _, Stored, Stream};
 
 use super::harness::{Client, ENROL, Fleet, MISSIONS, RETIRE, TICK, event, patient};
 use super::scripts;
@@ -109,4 +109,34 @@ fn the_plan_of_an_enrolment_stays_pending_for_the_next_owner() {
         panic!("no search is necessary")
     };
     assert!(decided.planning);
+}
+
+#[test]
+fn the_stored_state_does_not_grow_with_the_events() {
+    for (mission, component) in [("camara_like", "c_kinect"), ("ugv", "c_kinect"), ("uuv", "c_thruster_1")] {
+        let enrolment = format!(r#"{{"event": "enrol", "mission": "{mission}"}}"#);
+        let status = |status| {
+            format!(r#"{{"event": "component_status", "component": "{component}", "status": "{status}"}}"#)
+        };
+        let [lost, well] = [status("FALSE"), status("OK")];
+        let mut robot = Robot::default();
+        let size = |number: u64| {
+            let text = match number {
+                1 => &enrolment,
+                number if number.is_multiple_of(100) => &lost,
+                number if number % 100 == 50 => &well,
+                _ => TICK,
+            };
+            let event = Stored { id: Some(format!("r:{number}")), ..event(number, text) };
+            let decided = robot.decide(&event, &MISSIONS).expect("it is not refused");
+            serde_json::to_vec(&decided).expect("plain data").len()
+        };
+        let sizes: Vec<usize> = (1..=600).map(size).collect();
+        let [first, last] = [100..300, 300..600].map(|numbers| sizes[numbers].iter().max());
+        // Numbers of events have further digits.
+        assert!(
+            last <= first.map(|first| first + 8).as_ref() && last < Some(&4000),
+            "{mission}: {first:?}, {last:?}"
+        );
+    }
 }
