@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::{Settings, Shared, serve};
+use metaplan_fleet::robot::{Begun, Robot};
 use metaplan_fleet::robots::Sender;
 use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::{Message, Store, Stored, Stream};
@@ -84,6 +85,20 @@ impl Fleet {
 
     pub(super) async fn append_event(&self, subject: &str, id: &str, payload: &[u8]) -> u64 {
         self.append(Stream::Events, Message { subject, id, after: None, payload }).await
+    }
+
+    /// Appends the enrolment of the robot `r`, and the decision of an owner that ends before it has found the plan. Returns
+    /// the sequence number of the enrolment.
+    pub(super) async fn enrol_without_plan(&self, missions: &Missions) -> u64 {
+        let enrolment = self.append_event("0.r", "", ENROL.as_bytes()).await;
+        let mut robot = Robot::default();
+        let Ok(Begun::Search(search)) = robot.begin(&event(enrolment, ENROL), missions) else {
+            panic!("a search is necessary")
+        };
+        let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
+        let message = Message { subject: "0.r", id: "", after: Some(0), payload: &payload };
+        self.append(Stream::Decisions, message).await;
+        enrolment
     }
 
     /// Appends events without ids. Returns their sequence numbers.

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use metaplan_fleet::partition::Settings;
 use metaplan_fleet::robot::{Begun, Robot};
-use metaplan_fleet::store::{Message, Store as _, Stored, Stream};
+use metaplan_fleet::store::{Store as _, Stored};
 
-use super::harness::{Client, ENROL, Fleet, MISSIONS, RETIRE, TICK, event, patient};
+use super::harness::{Client, Fleet, MISSIONS, RETIRE, TICK, event, patient};
 use super::scripts;
 
 /// Settings with which a decision waits this number of milliseconds for its plan.
@@ -78,15 +78,7 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_refused_event_starts_the_search_for_a_pending_plan() {
     let fleet = Fleet::new(1);
-    let enrolment = fleet.append_event("0.r", "", ENROL.as_bytes()).await;
-    let mut robot = Robot::default();
-    let Ok(Begun::Search(search)) = robot.begin(&event(enrolment, ENROL), &MISSIONS) else {
-        panic!("a search is necessary")
-    };
-    let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
-    fleet
-        .append(Stream::Decisions, Message { subject: "0.r", id: "", after: Some(0), payload: &payload })
-        .await;
+    let enrolment = fleet.enrol_without_plan(&MISSIONS).await;
     fleet.store.discard("0.r", enrolment).await.expect("it is our own directory");
     fleet.append_event("0.r", "s:1", TICK.as_bytes()).await;
     let _owner = fleet.own("owner", Settings { discard_every: 1, ..hasty(0) });
