@@ -127,7 +127,7 @@ pub trait Store: Clone + Send + Sync + 'static {
     /// Returns the last message of a subject, or `None` if the subject has no message.
     async fn last(&self, stream: Stream, subject: &str) -> Result<Option<Stored>, Fault>;
 
-    /// Returns the first event of a subject with at least this sequence number, or `None` if there is none.
+    /// Returns the first event of a subject with at least this sequence number, or `None` if it does not exist.
     async fn next(&self, subject: &str, start: u64) -> Result<Option<Stored>, Fault>;
 
     /// Publishes the status of a worker until it expires, or withdraws it.
