@@ -20,9 +20,9 @@
 
 mod address;
 mod canvas;
+pub mod http;
 mod hub;
 mod keep;
-mod request;
 mod server;
 mod token;
 

@@ -1,22 +1,19 @@
 //! HTTP server: answers requests with the page, the picture of the plan, or the event stream.
 
-use std::io::{self, Write as _};
-use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::io;
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::live::address::{Address, is_local_host};
 use crate::live::canvas::Canvas;
+use crate::live::http::{Request, Status, respond, send, serve};
 use crate::live::hub::{Hub, HubSender, News};
-use crate::live::request::{Refused, Request};
 use crate::live::token::Token;
 use crate::mapek::{DesignChange, Outlook};
 use crate::message::Message;
 use crate::report::Painter;
-
-/// Time limit for reading a request, and for sending each text.
-const CLIENT_TIMEOUT: Duration = Duration::from_secs(5);
 
 const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
 
@@ -34,6 +31,7 @@ pub struct Live {
     sender: HubSender,
     address: SocketAddr,
     shared: Arc<SharedState>,
+    open_connections: Arc<AtomicUsize>,
 }
 
 #[derive(Debug)]
@@ -41,7 +39,6 @@ struct SharedState {
     hub: Arc<Hub>,
     canvas: Canvas,
     token: Option<Token>,
-    open_connections: AtomicUsize,
 }
 
 impl Live {
@@ -65,19 +62,11 @@ impl Live {
         let hub = Arc::new(Hub::default());
         let sender = HubSender::of(Arc::clone(&hub));
         let canvas = Canvas::new(painter);
-        let shared = Arc::new(SharedState { hub, canvas, token, open_connections: AtomicUsize::new(0) });
-        let accepting = Arc::clone(&shared);
-        std::thread::spawn(move || {
-            for stream in listener.incoming() {
-                match stream {
-                    Ok(stream) => receive(&accepting, stream),
-                    // The error may be temporary, for example too many open files until other
-                    // connections close.
-                    Err(_) => std::thread::sleep(Duration::from_millis(50)),
-                }
-            }
-        });
-        Ok(Self { sender, address, shared })
+        let shared = Arc::new(SharedState { hub, canvas, token });
+        let state = Arc::clone(&shared);
+        let open_connections =
+            serve(listener, MAX_CONNECTIONS, move |request, stream| answer(&state, request, stream));
+        Ok(Self { sender, address, shared, open_connections })
     }
 
     /// Returns the address of the server.
@@ -112,44 +101,16 @@ impl Live {
     pub fn end(&self) {
         self.sender.end();
         let begun = Instant::now();
-        while self.shared.open_connections.load(Ordering::Acquire) > 0 && begun.elapsed() < SHUTDOWN_GRACE {
+        while self.open_connections.load(Ordering::Acquire) > 0 && begun.elapsed() < SHUTDOWN_GRACE {
             std::thread::sleep(Duration::from_millis(5));
         }
     }
 }
 
-struct ConnectionGuard(Arc<SharedState>);
-
-impl Drop for ConnectionGuard {
-    fn drop(&mut self) {
-        self.0.open_connections.fetch_sub(1, Ordering::AcqRel);
-    }
-}
-
-/// Answers a connection on a new thread, with status 503 if there are too many connections.
-fn receive(shared: &Arc<SharedState>, mut stream: TcpStream) {
-    let connections = shared.open_connections.fetch_add(1, Ordering::AcqRel);
-    let guard = ConnectionGuard(Arc::clone(shared));
-    let is_full = connections >= MAX_CONNECTIONS;
-    let answered = std::thread::Builder::new().spawn(move || {
-        // A write error means that the client has disconnected.
-        let _ = if is_full {
-            refuse(&mut stream, (503, "Service Unavailable"))
-        } else {
-            answer(&guard.0, &mut stream)
-        };
-        let _ = stream.shutdown(Shutdown::Both);
-        drop(guard);
-    });
-    // If no thread could be started, the connection is closed and its guard is dropped.
-    drop(answered);
-}
-
-fn answer(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
-    stream.set_nodelay(true)?;
-    let request = match Request::read(stream, CLIENT_TIMEOUT)? {
+fn answer(shared: &SharedState, request: Result<Request, Status>, stream: &mut TcpStream) -> io::Result<()> {
+    let request = match request {
         Ok(request) => request,
-        Err(refused) => return refuse(stream, refused),
+        Err(status) => return refuse(stream, status),
     };
     if let Err(refused) = authorize(shared, &request) {
         return refuse(stream, refused);
@@ -164,7 +125,7 @@ fn answer(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     }
 }
 
-fn authorize(shared: &SharedState, request: &Request) -> Result<(), Refused> {
+fn authorize(shared: &SharedState, request: &Request) -> Result<(), Status> {
     if let Some(token) = &shared.token {
         let fits = request.authorization.as_deref().is_some_and(|given| token.fits(given));
         return if fits { Ok(()) } else { Err((401, "Unauthorized")) };
@@ -174,39 +135,30 @@ fn authorize(shared: &SharedState, request: &Request) -> Result<(), Refused> {
     if is_local { Ok(()) } else { Err((403, "Forbidden")) }
 }
 
-/// Headers of every response: no caching, no content sniffing, no framing, no foreign resources.
-const COMMON: &str = "Connection: close\r\nCache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
+/// Headers of every response: no content sniffing, no framing, no foreign resources.
+const COMMON: &str = "X-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
     Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; \
     base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n";
 
 fn document(stream: &mut TcpStream, kind: &str, text: &str) -> io::Result<()> {
-    let length = text.len();
-    let head = format!(
-        "HTTP/1.1 200 OK\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {length}\r\n{COMMON}\r\n"
-    );
-    send(stream, &(head + text))
+    respond(stream, (200, "OK"), &format!("Content-Type: {kind}; charset=utf-8\r\n{COMMON}"), text)
 }
 
-fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
-    let headers = match status {
+fn refuse(stream: &mut TcpStream, (status, words): Status) -> io::Result<()> {
+    let header = match status {
         401 => "WWW-Authenticate: Basic realm=\"metaplan\", charset=\"UTF-8\"\r\n",
         405 => "Allow: GET\r\n",
         _ => "",
     };
-    let text = format!("{words}\n");
-    let length = text.len();
-    let kind = "text/plain; charset=utf-8";
-    let head = format!(
-        "HTTP/1.1 {status} {words}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{headers}{COMMON}\r\n"
-    );
-    send(stream, &(head + &text))
+    let headers = format!("Content-Type: text/plain; charset=utf-8\r\n{header}{COMMON}");
+    respond(stream, (status, words), &headers, &format!("{words}\n"))
 }
 
 fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,
         &format!(
-            "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n{COMMON}\r\nevent: begin\ndata: {{}}\n\n"
+            "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nConnection: close\r\nCache-Control: no-store\r\n{COMMON}\r\nevent: begin\ndata: {{}}\n\n"
         ),
     )?;
     let (state, mut next) = shared.hub.state();
@@ -230,23 +182,4 @@ fn events(shared: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
 
 fn stanzas(lines: &[Arc<str>]) -> String {
     lines.iter().flat_map(|line| ["data: ", line, "\n\n"]).collect()
-}
-
-fn send(stream: &mut TcpStream, text: &str) -> io::Result<()> {
-    let begun = Instant::now();
-    let mut remaining = text.as_bytes();
-    while !remaining.is_empty() {
-        // The timeout applies to the whole text, not to each write.
-        let timeout = CLIENT_TIMEOUT.saturating_sub(begun.elapsed());
-        if timeout.is_zero() {
-            return Err(io::ErrorKind::TimedOut.into());
-        }
-        stream.set_write_timeout(Some(timeout))?;
-        match stream.write(remaining) {
-            Ok(count) => remaining = &remaining[count..],
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(())
 }

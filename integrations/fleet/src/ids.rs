@@ -130,10 +130,6 @@ mod tests {
 
     use super::*;
 
-    fn contains(ids: &Ids, id: &str) -> bool {
-        ids.membership(id) == Membership::Present
-    }
-
     #[test]
     fn different_ids_are_split_differently() {
         let ids = ["r:7", "r:07", "r:007", "r:", "r:0", "r:00", "r:a", "r:1:1", "r:11", "7", "", "r:ü7"];
@@ -146,64 +142,54 @@ mod tests {
     }
 
     #[test]
-    fn growing_numbers_are_remembered_in_one_range() {
+    fn growing_numbers_are_one_range_in_the_last_sessions() {
         let mut ids = Ids::default();
         for number in 1..=100_000 {
-            let id = format!("r:s.{number}");
-            assert!(!contains(&ids, &id));
-            ids.insert(&id);
+            ids.insert(&format!("r:s.{number}"));
         }
         assert_eq!(serde_json::to_string(&ids).expect("plain data"), r#"[["r:s.",[[1,100000]]]]"#);
-        assert!(contains(&ids, "r:s.1") && contains(&ids, "r:s.99999") && !contains(&ids, "r:s.100001"));
-        assert!(!contains(&ids, "r:t.1"));
-    }
-
-    #[test]
-    fn memory_is_bounded_and_new_numbers_are_never_duplicates() {
-        let mut random = fastrand::Rng::with_seed(3);
-        let (mut ids, mut seen) = (Ids::default(), BTreeSet::new());
-        let mut base = 100;
-        for _ in 0..20_000 {
-            base += random.u64(0..3);
-            // Within the ranges that are kept apart, numbers can arrive in any order.
-            let number = base - random.u64(0..4);
-            let id = format!("r:{number}");
-            assert_eq!(contains(&ids, &id), !seen.insert(number), "{number}");
-            ids.insert(&id);
-            assert!(ids.0[0].1.len() <= MAX_RANGES);
-            assert!(ids.0[0].1.windows(2).all(|pair| pair[0].1 + 1 < pair[1].0), "{ids:?}");
-        }
         for session in 0..100 {
             ids.insert(&format!("r:{session}.1"));
         }
         assert_eq!(ids.0.len(), MAX_SESSIONS);
-        assert!(contains(&ids, "r:99.1") && !contains(&ids, "r:83.1"));
+        assert_eq!(ids.membership("r:84.1"), Membership::Present);
+        assert_eq!(ids.membership("r:83.1"), Membership::Absent);
     }
 
+    /// Compares with the set of all inserted numbers.
     #[test]
-    fn only_numbers_between_merged_ranges_are_unclear() {
-        use Membership::{Absent, Present, Unclear};
-        let mut ids = Ids::default();
-        // 17 ranges, of which the two lowest ones are merged to 10..=12.
-        for number in (10..=42).step_by(2) {
-            ids.insert(&format!("r:{number}"));
+    fn inserted_numbers_are_present_or_lie_in_the_merged_range() {
+        let mut random = fastrand::Rng::with_seed(3);
+        // Within the ranges that are kept apart, numbers can arrive in any order.
+        for (step, distance, may_be_unclear) in [(3, 4, false), (10, 400, true), (100, 5000, true)] {
+            let (mut ids, mut inserted, mut base) = (Ids::default(), BTreeSet::new(), 10_000);
+            let mut unclear = 0;
+            for _ in 0..5_000 {
+                base += random.u64(..step);
+                let number = base - random.u64(..distance);
+                let id = format!("r:{number}");
+                match ids.membership(&id) {
+                    Membership::Absent => assert!(inserted.insert(number), "{number}"),
+                    Membership::Present => assert!(inserted.contains(&number), "{number}"),
+                    Membership::Unclear => unclear += 1,
+                }
+                ids.insert(&id);
+                let stored = serde_json::to_string(&ids).expect("plain data");
+                assert_eq!(serde_json::from_str::<Ids>(&stored).expect("it is stored so"), ids);
+                let Session(_, ranges, merged) = &ids.0[0];
+                assert!(
+                    ranges.len() <= MAX_RANGES && ranges.windows(2).all(|pair| pair[0].1 + 1 < pair[1].0)
+                );
+                let mut ends = merged.iter().chain(ranges).flat_map(|(first, last)| [first, last]);
+                assert!(ends.all(|end| inserted.contains(end)), "{ids:?}");
+                assert_eq!(
+                    ids.membership("r:1"),
+                    Membership::Absent,
+                    "it is less than all that were inserted"
+                );
+            }
+            assert_eq!(unclear > 0, may_be_unclear);
         }
-        let stored = serde_json::to_string(&ids).expect("plain data");
-        assert!(stored.ends_with(",[42,42]],[10,12]]]"), "{stored}");
-        let mut ids: Ids = serde_json::from_str(&stored).expect("it is stored so");
-        let memberships = |ids: &Ids, numbers: &[u64]| -> Vec<Membership> {
-            numbers.iter().map(|number| ids.membership(&format!("r:{number}"))).collect()
-        };
-        let expected = [Absent, Unclear, Unclear, Unclear, Absent, Present, Absent, Present];
-        assert_eq!(memberships(&ids, &[9, 10, 11, 12, 13, 14, 15, 42]), expected);
-        // There are 15 further ranges, so this is the sixteenth one, and the next one is merged.
-        ids.insert("r:5");
-        assert_eq!(memberships(&ids, &[5, 6, 10]), [Present, Absent, Unclear]);
-        ids.insert("r:44");
-        assert_eq!(
-            memberships(&ids, &[4, 5, 6, 12, 13, 14]),
-            [Absent, Unclear, Unclear, Unclear, Absent, Present]
-        );
     }
 
     #[test]
@@ -214,8 +200,9 @@ mod tests {
         let stored = serde_json::to_string(&ids).expect("plain data");
         assert!(stored.len() < 100, "{stored}");
         let ids: Ids = serde_json::from_str(&stored).expect("it is stored so");
-        let expected = [[true, false], [false, false], [false, false]];
-        let contained = texts.map(|text| [7, 8].map(|number| contains(&ids, &format!("{text}{number}"))));
-        assert_eq!(contained, expected);
+        let is_present =
+            |text: &str, number: u64| ids.membership(&format!("{text}{number}")) == Membership::Present;
+        let contained = texts.map(|text| [7, 8].map(|number| is_present(&text, number)));
+        assert_eq!(contained, [[true, false], [false, false], [false, false]]);
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::io::{self, Write as _};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -114,9 +115,14 @@ fn say(message: &Message) {
     eprint!("{}", message.text());
 }
 
-pub(crate) async fn send<S: Store>(store: S, session: &str) -> Result<(), Message> {
+/// Stores events from standard input. `session` is that of [`Sender::new`], by default a random word.
+pub(crate) async fn send<S: Store>(store: &S, session: Option<String>) -> Result<(), Message> {
     let (_goes_on, stop) = watch::channel(false);
-    feed(&store, session, stop).await
+    feed(store, &session.unwrap_or_else(random_session), stop).await
+}
+
+fn random_session() -> String {
+    format!("{:016x}", fastrand::u64(..))
 }
 
 /// Converts a stored decision to the robot's name and the JSON text for the output line. Returns
@@ -206,8 +212,7 @@ pub(crate) async fn up(
     let working = tokio::spawn(worker::run(Arc::clone(&shared), orders));
     let running = Arc::clone(&writer);
     let writing = tokio::spawn(async move { running.run().await });
-    let session = format!("{:016x}.", fastrand::u64(..));
-    let fed = feed(&store, &session, stop.clone()).await;
+    let fed = feed(&store, &random_session(), stop.clone()).await;
     // Waits until all stored events are decided and all decisions written, unless the program is
     // stopped or the output is closed.
     while !*stop.borrow_and_update() && !writing.is_finished() && !is_done(&shared, &writer.written).await? {
@@ -242,16 +247,21 @@ fn warning(received: Result<(String, String), RecvError>) -> Option<Message> {
     Some(Message::warning("N320", text))
 }
 
-/// Returns `true` if all stored events are decided, refused, or of a suspended robot, and all decisions are written.
+/// Returns `true` if all stored events are decided, refused, or of a suspended robot, their plans are found, and all
+/// decisions are written.
 async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) -> Result<bool, Message> {
+    let counts = &shared.counts;
     // Events are checked first: once all of them are handled, their decisions are stored.
-    for (stream, positions) in [(Stream::Events, &shared.counts.reached), (Stream::Decisions, written)] {
+    for (stream, positions) in [(Stream::Events, &counts.seen), (Stream::Decisions, written)] {
         for partition in 0..shared.store.partitions() {
             let end = shared.store.end(stream, partition).await.map_err(fault)?;
             let positions = positions.lock().unwrap_or_else(PoisonError::into_inner);
             if positions.get(&partition).copied().unwrap_or_default() < end {
                 return Ok(false);
             }
+        }
+        if counts.waiting.load(Ordering::SeqCst) + counts.planning.load(Ordering::SeqCst) > 0 {
+            return Ok(false);
         }
     }
     Ok(true)

@@ -149,10 +149,10 @@ impl Work {
         }
     }
 
-    async fn open_endpoints(&self) -> Result<Arc<Health>, Errors> {
+    fn open_endpoints(&self) -> Result<Arc<Health>, Errors> {
         let health = Arc::<Health>::default();
         if let Some(address) = self.metrics {
-            endpoints::open(address, Arc::clone(&health)).await?;
+            endpoints::open(address, Arc::clone(&health))?;
         }
         Ok(health)
     }
@@ -209,19 +209,19 @@ async fn run(command: Command) -> Result<(), Errors> {
         Command::Worker { server, work, name } => {
             // The endpoints are opened first, so that probes can distinguish a worker that waits for its servers from
             // one that hangs.
-            let health = work.open_endpoints().await?;
+            let health = work.open_endpoints()?;
             let store = server.open(60).await?;
             let shared = work.shared(store, name.unwrap_or_else(own_name), health)?;
             worker::run(shared, signals()?).await;
         }
         Command::Up { local, after, work, partitions, history } => {
             let store = Local::open(&local, partitions, history as usize, Duration::from_secs(10))?;
-            let health = work.open_endpoints().await?;
+            let health = work.open_endpoints()?;
             let shared = work.shared(store, own_name(), health)?;
             lines::up(shared, after, signals()?).await?;
         }
         Command::Send { server, session } => {
-            lines::send(server.open(10).await?, &id_prefix(session)).await?;
+            lines::send(&server.open(10).await?, session).await?;
         }
         Command::Follow { server, robot, after } => {
             let writer = lines::Writer::new(server.open(10).await?, robot, after).await?;
@@ -239,12 +239,6 @@ async fn run(command: Command) -> Result<(), Errors> {
         }
     }
     Ok(())
-}
-
-/// Returns the part of message ids before the number of the message. It ends with a separator, because sessions can end
-/// with a digit.
-fn id_prefix(session: Option<String>) -> String {
-    format!("{}.", session.unwrap_or_else(|| format!("{:016x}", fastrand::u64(..))))
 }
 
 /// Parses the name of a worker, under which the server stores its status.
@@ -278,12 +272,6 @@ fn signals() -> Result<watch::Receiver<bool>, Message> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn sessions_that_end_with_a_digit_share_no_message_ids() {
-        let id = |session: &str, number: u64| format!("{}{number}", id_prefix(Some(session.to_owned())));
-        assert_ne!(id("1", 11), id("11", 1));
-    }
 
     #[test]
     fn names_of_workers_can_be_keys() {

@@ -38,53 +38,39 @@ enum Control {
     Unreadable,
 }
 
-/// Reason for refusing an event, which then changes nothing. As text, a sentence for the sender of the event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+/// Reason for refusing an event, which then changes nothing. As text, a sentence for the sender of the event;
+/// as a static string, the name of the reason in metrics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Refused {
     /// The robot is not enrolled, so it has no mission.
     #[error(r#"the robot is not enrolled: send `{{"event": "enrol", "mission": NAME}}` first"#)]
-    Unknown,
+    NotEnrolled,
     /// The event enrols a robot that is already enrolled.
     #[error(r#"the robot is enrolled already: send `{{"event": "retire"}}` before it gets another mission"#)]
-    Enrolled,
+    EnrolledAlready,
     /// The directory of missions has no mission of this name.
     #[error("there is no mission of that name")]
-    Mission,
+    UnknownMission,
     /// The event requests a migration at an unknown point.
     #[error("`at` is `action_end` or `goal`")]
-    SafePoint,
+    UnknownSafePoint,
     /// The message id does not begin with the robot's name and a colon.
     #[error("the message id must be that of its robot: `ROBOT:NUMBER`")]
-    Forged,
+    ForgedId,
     /// The subject's partition is not the partition of the robot.
     #[error("the robot belongs to another partition")]
-    Misplaced,
+    WrongPartition,
     /// An event with the same message id was decided before.
     #[error("an event with this message id was decided before")]
-    Repeated,
+    RepeatedId,
     /// The number of the message id lies in a merged range, so a decision about the event is possible, but not recorded; see
     /// [`Membership::Unclear`].
     #[error(
         "the event is too late: so many events with higher numbers were decided before it that whether it was decided, \
          too, is not stored"
     )]
-    Late,
-}
-
-impl Refused {
-    /// Returns the name of the reason in metrics.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Unknown => "not_enrolled",
-            Self::Enrolled => "enrolled_already",
-            Self::Mission => "unknown_mission",
-            Self::SafePoint => "unknown_safe_point",
-            Self::Forged => "forged_id",
-            Self::Misplaced => "wrong_partition",
-            Self::Repeated => "repeated_id",
-            Self::Late => "late_id",
-        }
-    }
+    LateId,
 }
 
 /// Events for the fleet; all others are observations for the loop. Fields are checked when the event is decided.
@@ -134,7 +120,7 @@ pub enum Undecided {
 pub enum Begun {
     /// The event is decided.
     Decided(Decided),
-    /// A search for a plan is necessary: [`Robot::search`] or [`Robot::finish`] completes the decision.
+    /// A search for a plan is necessary: [`Robot::thinker`] finds it, and [`Robot::finish`] completes the decision.
     Search(Search),
 }
 
@@ -174,7 +160,10 @@ impl Robot {
     pub fn decide(&mut self, event: &Stored, missions: &Missions) -> Result<Decided, Undecided> {
         match self.begin(event, missions)? {
             Begun::Decided(decided) => Ok(decided),
-            Begun::Search(search) => self.search(search),
+            Begun::Search(search) => {
+                let thoughts = self.thinker(missions)?.map(Thinker::think);
+                Ok(self.finish(search, thoughts))
+            }
         }
     }
 
@@ -185,8 +174,8 @@ impl Robot {
     /// As for [`Robot::decide`].
     pub fn begin(&mut self, event: &Stored, missions: &Missions) -> Result<Begun, Undecided> {
         match event.id.as_ref().map(|id| self.state.ids.membership(id)) {
-            Some(Membership::Present) => return Err(Refused::Repeated.into()),
-            Some(Membership::Unclear) => return Err(Refused::Late.into()),
+            Some(Membership::Present) => return Err(Refused::RepeatedId.into()),
+            Some(Membership::Unclear) => return Err(Refused::LateId.into()),
             Some(Membership::Absent) | None => {}
         }
         let text = String::from_utf8_lossy(&event.payload);
@@ -195,10 +184,10 @@ impl Robot {
         let mut search = Search { decided, answers: Vec::new(), id: event.id.clone() };
         if let Request::Enrol { mission } = &request {
             if self.state.mission.is_some() {
-                return Err(Refused::Enrolled.into());
+                return Err(Refused::EnrolledAlready.into());
             }
             let name = mission.as_str().unwrap_or_default();
-            let template = missions.get(name).ok_or(Refused::Mission)?;
+            let template = missions.get(name).ok_or(Refused::UnknownMission)?;
             search.decided.enrolled = Some(name.to_owned());
             self.state.mission = Some(name.to_owned());
             (self.state.digest, self.state.enrolled) = (template.digest.clone(), event.time);
@@ -206,7 +195,7 @@ impl Robot {
                 Control::Loaded(Box::new(template.control.clone()), Arc::clone(&template.baseline));
             return Ok(self.deliberate(search));
         }
-        let name = self.state.mission.clone().ok_or(Refused::Unknown)?;
+        let name = self.state.mission.clone().ok_or(Refused::NotEnrolled)?;
         search.decided.now = event.time.saturating_sub(self.state.enrolled);
         match request {
             Request::Retire => {
@@ -217,8 +206,8 @@ impl Robot {
             }
             Request::Migrate { at } => {
                 let at = at.map_or(Ok(SafePoint::default()), serde_json::from_value);
-                let at = at.map_err(|_| Refused::SafePoint)?;
-                let current = missions.get(&name).ok_or(Refused::Mission)?;
+                let at = at.map_err(|_| Refused::UnknownSafePoint)?;
+                let current = missions.get(&name).ok_or(Refused::UnknownMission)?;
                 self.load(missions)?;
                 let target = Some(current.digest.clone()).filter(|target| *target != self.state.digest);
                 self.state.migration = target.map(|target| Migration { at, target });
@@ -234,18 +223,6 @@ impl Robot {
             }
         }
         Ok(self.deliberate(search))
-    }
-
-    /// Runs the second phase of [`Robot::decide`]: searches for plans.
-    ///
-    /// # Errors
-    /// The loop is not loaded, because [`Robot::begin`] did not precede.
-    pub fn search(&mut self, mut search: Search) -> Result<Decided, Undecided> {
-        let Control::Loaded(control, _) = &mut self.control else {
-            return Err(Undecided::Faulted("the loop of the robot is not loaded".to_owned()));
-        };
-        search.answers.extend(control.deliberate());
-        Ok(self.complete(search))
     }
 
     /// Completes a decision with the plans that were found in the meantime. Without usable plans, the decision has only
@@ -382,7 +359,5 @@ fn version<'a>(missions: &'a Missions, name: &str, digest: &str) -> Result<&'a T
 }
 
 pub(crate) fn is_retirement(payload: &[u8]) -> bool {
-    // Most events do not contain this word, so they need not be parsed.
-    let has_word = payload.windows(6).any(|part| part == b"retire");
-    has_word && matches!(Request::parse(&String::from_utf8_lossy(payload)), Request::Retire)
+    matches!(Request::parse(&String::from_utf8_lossy(payload)), Request::Retire)
 }

@@ -18,22 +18,22 @@ use crate::worker::owners;
 pub struct Sender<S> {
     store: S,
     address: Address,
-    /// Part of a message id between the robot's name and the number of the event, which is counted
-    /// from 1 for each sender. It distinguishes the senders of a robot.
-    session: String,
+    /// Message id without the number of the event, which is counted from 1 for each sender.
+    prefix: String,
     number: u64,
 }
 
 impl<S: Store> Sender<S> {
-    /// Creates a sender for a robot. `session` becomes a part of the message ids. It should not end with a digit: without
-    /// a separator, the event 11 of session `1` and the event 1 of session `11` have the same id.
+    /// Creates a sender for a robot. `session` distinguishes the senders of a robot: message ids are
+    /// `ROBOT:SESSION.NUMBER`, or `ROBOT:NUMBER` if it is empty.
     ///
     /// If a second sender has the same session, it must send the same events in the same order. It
     /// then creates the same message ids. So no event is decided twice, and none is stored twice
     /// (with NATS: within ten minutes; in a directory: until it is discarded).
     pub fn new(store: S, robot: &str, session: &str) -> Self {
         let address = Address::of(robot, store.partitions());
-        Self { store, address, session: session.to_owned(), number: 0 }
+        let separator = if session.is_empty() { "" } else { "." };
+        Self { store, address, prefix: format!("{robot}:{session}{separator}"), number: 0 }
     }
 
     /// Returns the address of the robot.
@@ -52,7 +52,7 @@ impl<S: Store> Sender<S> {
         // Another client may have used this message id for another message. Then a different id is
         // chosen.
         for spare in 0_u32.. {
-            let mut id = format!("{}:{}{}", self.address.robot, self.session, self.number);
+            let mut id = format!("{}{}", self.prefix, self.number);
             if spare > 0 {
                 id = format!("{id}:{spare}");
             }
@@ -75,9 +75,9 @@ impl<S: Store> Sender<S> {
     /// Returns `true` if the event with this sequence number has the subject and payload that were sent, or was
     /// discarded after the robot's decision about it.
     async fn is_own(&self, subject: &str, sequence: u64, id: &str, event: &str) -> bool {
-        let stored = persist(|| self.store.event(sequence)).await;
-        if let Some(stored) = stored {
-            return stored.subject == subject && stored.payload == event.as_bytes();
+        let stored = persist(|| self.store.next(subject, sequence)).await;
+        if let Some(stored) = stored.filter(|stored| stored.sequence == sequence) {
+            return stored.payload == event.as_bytes();
         }
         let last = persist(|| self.store.last(Stream::Decisions, subject)).await;
         last.and_then(|last| Decided::parse(&last.payload))

@@ -42,15 +42,14 @@ pub struct Settings {
     /// without it, and further events are handled in the meantime. Zero: no decision about an event contains a plan
     /// that had to be searched for.
     pub patience: Duration,
-    /// Maximum number of robots in memory. Others are loaded from their last decision when they have events. Robots
-    /// that are handling events may exceed this number.
+    /// Maximum number of robots in memory. Others are loaded from their last decision when they have events, and removed
+    /// afterwards. Robots that are handling events may exceed this number. A robot is also removed after ten minutes
+    /// without events.
     pub warm: usize,
     /// Number of handled events after which the events of a robot are discarded.
     pub discard_every: usize,
     /// Time after which a handled event is discarded.
     pub discard_within: Duration,
-    /// Time between two checks whether events have to be discarded.
-    pub look: Duration,
     /// Maximum time that a partition waits for running loops when it is given back. The next owner decides the
     /// events of loops that run longer.
     pub drain: Duration,
@@ -64,7 +63,6 @@ impl Default for Settings {
             warm: 4096,
             discard_every: 64,
             discard_within: Duration::from_secs(30),
-            look: Duration::from_millis(500),
             drain: Duration::from_secs(5),
         }
     }
@@ -101,8 +99,10 @@ pub struct Counts {
     pub refused: AtomicU64,
     /// Total working time of loops in microseconds.
     pub busy: AtomicU64,
-    /// For each partition: sequence number up to which all events are decided, refused, or of a suspended robot.
-    pub reached: Mutex<BTreeMap<u32, u64>>,
+    /// Number of robots whose last decision lacks a plan, without suspended robots.
+    pub planning: Arc<AtomicU64>,
+    /// For each partition: sequence number of the last event that was read.
+    pub seen: Mutex<BTreeMap<u32, u64>>,
 }
 
 impl<S> Shared<S> {

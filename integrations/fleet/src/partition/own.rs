@@ -1,21 +1,20 @@
-//! Execution of a partition: reads events, refuses those with a wrong address, queues the others for their robots, and
-//! unloads robots that were not used recently.
+//! Execution of a partition: reads events, refuses those with a wrong address, and passes the others to their robots.
 
-use std::collections::BTreeMap;
-use std::sync::{Arc, PoisonError};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use futures::StreamExt as _;
-use tokio::sync::{Semaphore, mpsc, watch};
+use tokio::sync::{Notify, watch};
 use tokio::task::JoinSet;
 
-use super::runner::{Count, Queued, Runner};
-use super::{Shared, pause};
+use super::runner::Runner;
+use super::{Shared, pause, persist};
 use crate::robot::Refused;
 use crate::store::{Fault, Store, Stored, Stream, Subscription};
 use crate::wire::{Address, partition_of};
 
-/// Maximum number of queued events of each robot whose contents are in memory. Further events are queued with their
-/// sequence numbers only.
+/// Maximum number of waiting events of each robot whose contents are in memory.
 const MAX_QUEUE: usize = 16;
 
 pub(super) struct Partition<S> {
@@ -23,63 +22,35 @@ pub(super) struct Partition<S> {
     number: u32,
     /// `true` if the partition is given back.
     drain: watch::Receiver<bool>,
-    slots: BTreeMap<String, Slot<S>>,
+    /// Events of the robots that are in memory, by the name of the robot.
+    inboxes: BTreeMap<String, Arc<Inbox>>,
     /// Sequence number of the last event that was read.
     seen: u64,
-    /// Robots that work, and discards of refused events.
+    /// Robots in memory, and discards of refused events.
     running: JoinSet<Option<Box<Runner<S>>>>,
-    /// Names of idle robots in the order of their last use, by [`Slot::used`].
-    recent: BTreeMap<u64, String>,
-    /// Number of times that a robot has become idle.
-    clock: u64,
-}
-
-struct Slot<S> {
-    queue: mpsc::UnboundedSender<Queued>,
-    /// One permit for each further event that can be in memory.
-    memory: Arc<Semaphore>,
-    /// `None` while the robot works.
-    idle: Option<Box<Runner<S>>>,
-    /// Value of [`Partition::clock`] when the robot was last used.
-    used: u64,
 }
 
 impl<S: Store> Partition<S> {
     pub(super) fn new(shared: Arc<Shared<S>>, number: u32, drain: watch::Receiver<bool>) -> Self {
-        let (slots, running, recent) = (BTreeMap::new(), JoinSet::new(), BTreeMap::new());
-        Self { shared, number, drain, slots, seen: 0, running, recent, clock: 0 }
+        Self { shared, number, drain, inboxes: BTreeMap::new(), seen: 0, running: JoinSet::new() }
     }
 
     pub(super) async fn run(mut self) {
-        let (mut backoff, mut reached) = (0, 0);
+        let mut backoff = 0;
         let mut events: Option<Subscription> = None;
-        let mut look = tokio::time::interval(self.shared.settings.look);
-        look.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let mut drain = self.drain.clone();
         while !*drain.borrow_and_update() {
-            // Without running robots, all events that were read are handled.
-            if self.running.is_empty() && reached != self.seen {
-                reached = self.seen;
-                let mut positions = self.shared.counts.reached.lock().unwrap_or_else(PoisonError::into_inner);
-                positions.insert(self.number, reached);
-            }
             if events.is_none() {
-                if let Ok(stream) = self.shared.store.follow(Stream::Events, self.number, self.seen).await {
-                    events = Some(stream);
-                } else {
-                    backoff += 1;
-                    pause(backoff).await;
-                }
+                events = self.shared.store.follow(Stream::Events, self.number, self.seen).await.ok();
             }
             tokio::select! {
                 biased;
                 Some(done) = self.running.join_next() => match done {
-                    Ok(runner) => self.rest(runner),
+                    Ok(runner) => self.end(runner),
                     // The worker starts the partition again.
                     Err(_) => return,
                 },
                 _ = drain.changed() => {}
-                _ = look.tick() => self.discard(false),
                 message = next(&mut events) => {
                     if let Some(Ok(event)) = message {
                         backoff = 0;
@@ -92,37 +63,53 @@ impl<S: Store> Partition<S> {
                 }
             }
         }
-        self.discard(true);
         let end = async { while self.running.join_next().await.is_some() {} };
         // Tasks that run longer are aborted.
         let _ = tokio::time::timeout(self.shared.settings.drain, end).await;
     }
 
-    /// Queues the next event of the stream for its robot, or refuses it because of its address.
+    /// Passes the next event of the stream to its robot, or refuses it because of its address.
     fn read(&mut self, event: Stored) {
         if event.sequence <= self.seen {
             return;
         }
         self.seen = event.sequence;
-        let Some(address) = Address::parse(&event.subject) else {
-            self.shared.refuse("wrong_subject", None);
-            return self.discard_refused(event);
-        };
-        if partition_of(&address.robot, self.shared.store.partitions()) != self.number {
-            let refused = Refused::Misplaced;
-            self.shared.refuse(refused.name(), Some((&event.subject, refused.to_string())));
-            return self.discard_refused(event);
+        match Address::parse(&event.subject) {
+            None => self.refuse("wrong_subject", None, event),
+            Some(address) if partition_of(&address.robot, self.shared.store.partitions()) != self.number => {
+                let refused = Refused::WrongPartition;
+                self.refuse(refused.into(), Some((&event.subject.clone(), refused.to_string())), event);
+            }
+            Some(address) => match self.inboxes.get(&address.robot) {
+                Some(inbox) => inbox.push(event),
+                None => {
+                    let inbox = Arc::new(Inbox::new(&self.shared.counts.waiting));
+                    inbox.push(event);
+                    self.inboxes.insert(address.robot.clone(), Arc::clone(&inbox));
+                    self.start(Box::new(Runner::new(Arc::clone(&self.shared), address, inbox)));
+                }
+            },
         }
-        let slot = self.slots.entry(address.robot.clone()).or_insert_with(|| {
-            let (queue, events) = mpsc::unbounded_channel();
-            let idle = Some(Box::new(Runner::new(Arc::clone(&self.shared), address, events)));
-            Slot { queue, memory: Arc::new(Semaphore::new(MAX_QUEUE)), idle, used: 0 }
+        let mut positions = self.shared.counts.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        positions.insert(self.number, self.seen);
+    }
+
+    fn refuse(&mut self, reason: &'static str, notice: Option<(&str, String)>, event: Stored) {
+        self.shared.refuse(reason, notice);
+        let shared = Arc::clone(&self.shared);
+        self.running.spawn(async move {
+            // The next owner of the partition refuses an event again that is not discarded.
+            let _ = shared.store.discard(&event.subject, event.sequence).await;
+            None
         });
-        let (sequence, waiting) = (event.sequence, Count::new(&self.shared.counts.waiting));
-        let permit = Arc::clone(&slot.memory).try_acquire_owned().ok();
-        // The slot or the running robot has the receiver.
-        let _ = slot.queue.send(Queued { sequence, event: permit.map(|permit| (event, permit)), waiting });
-        if let Some(runner) = slot.idle.take() {
+    }
+
+    /// Removes a robot of which nothing has to be kept in memory, unless it has got an event in the meantime.
+    fn end(&mut self, runner: Option<Box<Runner<S>>>) {
+        let Some(runner) = runner else { return };
+        if runner.inbox.is_empty() {
+            self.inboxes.remove(&runner.address.robot);
+        } else {
             self.start(runner);
         }
     }
@@ -131,69 +118,123 @@ impl<S: Store> Partition<S> {
         let run = runner.run(self.drain.clone());
         self.running.spawn(async { Some(run.await) });
     }
+}
 
-    fn discard_refused(&mut self, Stored { sequence, subject, .. }: Stored) {
-        let shared = Arc::clone(&self.shared);
-        self.running.spawn(async move {
-            // The next owner of the partition refuses an event again that is not discarded.
-            let _ = shared.store.discard(&subject, sequence).await;
-            None
-        });
+async fn next(events: &mut Option<Subscription>) -> Option<Result<Stored, Fault>> {
+    events.as_mut()?.next().await
+}
+
+/// Events of a robot that its partition has read. The first [`MAX_QUEUE`] of them are in memory. Later ones stay in the
+/// log, and are read again when it is their turn, so that the memory of a slow robot is bounded.
+pub(super) struct Inbox {
+    queue: Mutex<Queue>,
+    arrival: Notify,
+    /// Number of waiting events of all robots of the worker.
+    waiting: Arc<AtomicU64>,
+}
+
+#[derive(Default)]
+struct Queue {
+    events: VecDeque<Stored>,
+    /// Sequence number of the last event that the robot has taken.
+    taken: u64,
+    /// Sequence number of the last event that the partition has read.
+    last: u64,
+    /// Number of events that are not handled.
+    waiting: u64,
+}
+
+impl Inbox {
+    pub(super) fn new(waiting: &Arc<AtomicU64>) -> Self {
+        Self { queue: Mutex::default(), arrival: Notify::new(), waiting: Arc::clone(waiting) }
     }
 
-    /// Starts a runner again that has events, and forgets the robot of an obsolete one. Otherwise, the robot becomes
-    /// idle.
-    fn rest(&mut self, runner: Option<Box<Runner<S>>>) {
-        let Some(runner) = runner else { return };
-        let name = &runner.address.robot;
-        let Some(slot) = self.slots.get_mut(name) else { return };
-        self.recent.remove(&slot.used);
-        if runner.has_events() {
-            self.start(runner);
-        } else if runner.is_obsolete() {
-            self.slots.remove(name);
-        } else {
-            self.clock += 1;
-            slot.used = self.clock;
-            self.recent.insert(self.clock, name.clone());
-            slot.idle = Some(runner);
-            self.unload();
+    fn queue(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        let queue = self.queue();
+        queue.taken == queue.last
+    }
+
+    pub(super) fn push(&self, event: Stored) {
+        let mut queue = self.queue();
+        queue.waiting += 1;
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        // After an event that stays in the log, all others stay there until the robot has taken it.
+        let end = queue.events.back().map_or(queue.taken, |event| event.sequence);
+        let is_in_order = end == queue.last;
+        queue.last = event.sequence;
+        if is_in_order && queue.events.len() < MAX_QUEUE {
+            queue.events.push_back(event);
         }
+        self.arrival.notify_one();
     }
 
-    /// Unloads idle robots of this partition, the least recently used ones first, while the worker has more loaded
-    /// robots than its limit.
-    fn unload(&mut self) {
-        while self.shared.has_too_many_robots()
-            && let Some((_, name)) = self.recent.pop_first()
-        {
-            let Some(runner) = self.slots.get_mut(&name).and_then(|slot| slot.idle.as_mut()) else {
-                continue;
+    /// Waits for the next event of the robot, which is read from the log if it is not in memory. Events up to the sequence
+    /// number `decided` may be left out.
+    pub(super) async fn next<S: Store>(&self, store: &S, subject: &str, decided: u64) -> Stored {
+        loop {
+            let (event, taken, last) = {
+                let mut queue = self.queue();
+                let event = queue.events.pop_front();
+                queue.taken = event.as_ref().map_or(queue.taken, |event| event.sequence);
+                (event, queue.taken, queue.last)
             };
-            runner.unload();
-            if runner.is_obsolete() {
-                self.slots.remove(&name);
+            if let Some(event) = event {
+                return event;
+            }
+            if taken == last {
+                self.arrival.notified().await;
+                continue;
+            }
+            let start = taken.max(decided) + 1;
+            let event = persist(|| store.next(subject, start)).await;
+            // Another worker may have discarded the events.
+            let event = event.filter(|event| event.sequence <= last);
+            self.queue().taken = event.as_ref().map_or(last, |event| event.sequence);
+            match event {
+                Some(event) => return event,
+                None => self.finish(),
             }
         }
     }
 
-    /// Starts to discard the handled events of idle robots whose first handled event is at least
-    /// [`Settings::discard_within`](super::Settings::discard_within) old. With `all`, of all idle robots that have
-    /// handled events.
-    fn discard(&mut self, all: bool) {
-        let within = self.shared.settings.discard_within;
-        let is_due =
-            |runner: &mut Box<Runner<S>>| runner.since.is_some_and(|since| all || since.elapsed() >= within);
-        let due: Vec<_> = self.slots.values_mut().filter_map(|slot| slot.idle.take_if(is_due)).collect();
-        for runner in due {
-            self.start(runner);
-        }
+    /// Counts the event that was taken last as handled.
+    pub(super) fn finish(&self) {
+        let mut queue = self.queue();
+        // Events that were not taken are not counted one by one.
+        let count = if queue.taken == queue.last { queue.waiting } else { queue.waiting.min(1) };
+        queue.waiting -= count;
+        self.waiting.fetch_sub(count, Ordering::Relaxed);
     }
 }
 
-async fn next(events: &mut Option<Subscription>) -> Option<Result<Stored, Fault>> {
-    match events {
-        Some(events) => events.next().await,
-        None => std::future::pending().await,
+impl Drop for Inbox {
+    fn drop(&mut self) {
+        self.waiting.fetch_sub(self.queue().waiting, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_memory_of_waiting_events_is_bounded() {
+        let inbox = Inbox::new(&Arc::default());
+        for sequence in 1..=100_000 {
+            inbox.push(Stored {
+                sequence,
+                subject: "0.r".to_owned(),
+                id: None,
+                time: 0,
+                payload: Vec::new(),
+            });
+        }
+        let queue = inbox.queue();
+        assert_eq!((queue.events.len(), queue.waiting, queue.last), (MAX_QUEUE, 100_000, 100_000));
+        assert!(queue.events.capacity() <= 2 * MAX_QUEUE);
     }
 }

@@ -5,15 +5,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use futures::future::{BoxFuture, FutureExt as _};
 use metaplan::mapek::{ParallelSearch, SearchHandle, Thinker, Thoughts};
-use tokio::sync::{OwnedSemaphorePermit, mpsc, watch};
+use tokio::sync::watch;
+use tokio::task::JoinSet;
 
+use super::own::Inbox;
 use super::{Shared, pause, persist};
 use crate::missions::Missions;
 use crate::robot::{Begun, Refused, Robot, Undecided, is_retirement};
 use crate::store::{Fault, Message, Store, Stored, Stream};
 use crate::wire::{Address, Decided};
+
+/// Time without an event or a plan after which a robot is removed from memory.
+const MAX_IDLE: Duration = Duration::from_secs(600);
 
 /// Reason for a suspension: work on the robot has panicked, or the thread of a search could not be started.
 const PANICKED: &str = "its loop has panicked";
@@ -31,13 +35,6 @@ impl Drop for Count {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
-}
-
-pub(super) struct Queued {
-    pub(super) sequence: u64,
-    /// `None` if the queue in memory was full. The event is then read again when it is its turn.
-    pub(super) event: Option<(Stored, OwnedSemaphorePermit)>,
-    pub(super) waiting: Count,
 }
 
 /// State of a robot after its last decision, which has the sequence number `chain`; 0 without a decision.
@@ -74,25 +71,25 @@ type Plans = Option<(Thoughts, Duration)>;
 /// A search for a plan that continues after the decision.
 struct Planning {
     search: SearchHandle,
-    plans: BoxFuture<'static, Plans>,
+    plans: JoinSet<Plans>,
 }
 
 pub(super) struct Runner<S> {
     shared: Arc<Shared<S>>,
     pub(super) address: Address,
     subject: String,
-    queue: mpsc::UnboundedReceiver<Queued>,
+    pub(super) inbox: Arc<Inbox>,
     loaded: Option<Loaded>,
-    /// `true` if the last decision lacks a plan. Then the last event is not discarded, so that a new owner of the
+    /// Exists if the last decision lacks a plan. Then the last event is not discarded, so that a new owner of the
     /// partition searches for the plan.
-    is_pending: bool,
+    pending: Option<Count>,
     /// `true` if the robot was suspended while a plan was pending. Then the last event is not discarded, either.
     is_kept: bool,
     /// `true` if the robot cannot continue. Its events stay in the log, and only a retirement is handled.
     is_suspended: bool,
     /// The search that continues after the decision, and its plans.
     search: ParallelSearch,
-    plans: Option<BoxFuture<'static, Plans>>,
+    plans: JoinSet<Plans>,
     /// Estimated duration of the robot's next search, if it has searched before.
     estimate: Option<Duration>,
     /// Sequence number of the last event that was decided or refused.
@@ -100,106 +97,96 @@ pub(super) struct Runner<S> {
     /// Number of handled events since the last time that events of the robot were discarded, and the time of the
     /// first of them.
     obsolete: usize,
-    pub(super) since: Option<Instant>,
+    since: Option<Instant>,
+    /// Time of the last event or plan.
+    used: Instant,
 }
 
 impl<S: Store> Runner<S> {
-    pub(super) fn new(
-        shared: Arc<Shared<S>>,
-        address: Address,
-        queue: mpsc::UnboundedReceiver<Queued>,
-    ) -> Self {
+    pub(super) fn new(shared: Arc<Shared<S>>, address: Address, inbox: Arc<Inbox>) -> Self {
         Self {
             shared,
             subject: address.to_string(),
             address,
-            queue,
+            inbox,
             loaded: None,
-            is_pending: false,
+            pending: None,
             is_kept: false,
             is_suspended: false,
             search: ParallelSearch::default(),
-            plans: None,
+            plans: JoinSet::new(),
             estimate: None,
             handled: 0,
             obsolete: 0,
             since: None,
+            used: Instant::now(),
         }
     }
 
-    pub(super) fn has_events(&self) -> bool {
-        !self.queue.is_empty()
-    }
-
-    /// Removes the state of the robot, which its last decision contains, from memory.
-    pub(super) fn unload(&mut self) {
-        self.loaded = None;
-    }
-
-    /// Returns `true` if nothing has to be kept in memory.
-    pub(super) fn is_obsolete(&self) -> bool {
-        !self.is_suspended && self.obsolete == 0 && (self.loaded.is_none() || self.is_unknown())
-    }
-
-    fn is_unknown(&self) -> bool {
-        self.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission().is_none())
-    }
-
-    /// Works until the queue is empty and no plan is pending, or `drain` becomes true. Then discards handled events
-    /// if they are due, the partition is given back, or the robot is not enrolled.
+    /// Handles events and searches for plans until nothing of the robot has to be kept in memory, or `drain` becomes
+    /// true. Discards handled events when they are due.
     pub(super) async fn run(mut self: Box<Self>, mut drain: watch::Receiver<bool>) -> Box<Self> {
-        while self.has_events() || self.is_pending || self.plans.is_some() {
-            if self.is_pending && self.plans.is_none() && !self.has_events() {
+        while !self.is_obsolete() {
+            if self.pending.is_some() && self.plans.is_empty() && self.inbox.is_empty() {
                 let outcome = self.start_planning().await;
                 self.register(None, outcome);
                 continue;
             }
             let discard_at = self.since.map(|since| since + self.shared.settings.discard_within);
-            let Self { queue, plans, .. } = &mut *self;
+            let unload_at = self.loaded.as_ref().map(|_| self.used + MAX_IDLE);
+            let decided = self.loaded.as_ref().map_or(0, |loaded| loaded.robot.event);
+            let Self { inbox, plans, shared, subject, .. } = &mut *self;
             tokio::select! {
                 biased;
                 () = drained(&mut drain) => break,
-                plans = join(plans) => self.conclude(plans).await,
+                Some(plans) = join(plans) => self.conclude(plans).await,
                 () = until(discard_at) => {}
-                Some(queued) = queue.recv() => self.handle(queued).await,
+                event = inbox.next(&shared.store, subject, decided) => self.handle(event).await,
+                () = until(unload_at) => self.loaded = None,
             }
-            if self.obsolete >= self.shared.settings.discard_every || self.is_discard_due() {
+            let is_unknown = self.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission().is_none());
+            let is_due =
+                self.since.is_some_and(|since| since.elapsed() >= self.shared.settings.discard_within);
+            let is_idle = self.is_idle();
+            if is_due
+                || self.obsolete >= self.shared.settings.discard_every
+                || is_idle && is_unknown && self.obsolete > 0
+            {
                 self.discard().await;
             }
+            // The last decision contains the state.
+            if is_idle && (is_unknown || self.shared.has_too_many_robots()) {
+                self.loaded = None;
+            }
         }
-        let is_draining = *drain.borrow();
-        if is_draining {
+        if *drain.borrow() {
             // The next owner plans.
             self.search.interrupt();
-            self.plans = None;
-        }
-        if self.obsolete > 0 && (is_draining || self.is_discard_due() || self.is_unknown()) {
-            self.discard().await;
+            self.plans = JoinSet::new();
+            if self.obsolete > 0 {
+                self.discard().await;
+            }
         }
         self
     }
 
-    /// Returns `true` if the first handled event that is not discarded was handled
-    /// [`discard_within`](super::Settings::discard_within) ago.
-    fn is_discard_due(&self) -> bool {
-        self.since.is_some_and(|since| since.elapsed() >= self.shared.settings.discard_within)
+    fn is_idle(&self) -> bool {
+        self.inbox.is_empty() && self.pending.is_none() && self.plans.is_empty()
     }
 
-    async fn handle(&mut self, Queued { sequence, event, waiting }: Queued) {
-        let is_decided = self.loaded.as_ref().is_some_and(|loaded| sequence <= loaded.robot.event);
-        let event = match event {
-            None if !is_decided => persist(|| self.shared.store.event(sequence)).await,
-            event => event.map(|(event, _)| event),
-        };
-        let outcome = match event {
-            // A suspended robot can only be retired.
-            Some(event) if self.is_suspended && !is_retirement(&event.payload) => return,
-            Some(event) => self.decide(&event).await,
-            // It is decided, and perhaps discarded.
-            None => Outcome::Known,
-        };
-        drop(waiting);
-        self.register(Some(sequence), outcome);
+    /// Returns `true` if nothing has to be kept in memory.
+    fn is_obsolete(&self) -> bool {
+        self.is_idle() && self.loaded.is_none() && self.obsolete == 0 && !self.is_suspended
+    }
+
+    async fn handle(&mut self, event: Stored) {
+        // A suspended robot can only be retired.
+        if !self.is_suspended || is_retirement(&event.payload) {
+            let outcome = self.decide(&event).await;
+            self.register(Some(event.sequence), outcome);
+        }
+        self.used = Instant::now();
+        self.inbox.finish();
     }
 
     /// Handles an event until it is decided by this worker or another one, refused, or the robot cannot continue.
@@ -208,7 +195,7 @@ impl<S: Store> Runner<S> {
         self.load().await;
         let id = event.id.as_ref();
         if id.is_some_and(|id| id.split_once(':').is_none_or(|(robot, _)| robot != self.address.robot)) {
-            return Undecided::from(Refused::Forged).into();
+            return Undecided::from(Refused::ForgedId).into();
         }
         for attempt in 1.. {
             if event.sequence <= self.load().await.robot.event {
@@ -234,7 +221,7 @@ impl<S: Store> Runner<S> {
 
     /// Returns the decision about an event, and the search that continues if the decision lacks a plan.
     async fn decision(&mut self, event: &Stored) -> Result<(Decided, Option<Planning>), Outcome> {
-        let (event, may_search) = (event.clone(), self.plans.is_none());
+        let (event, may_search) = (event.clone(), self.plans.is_empty());
         let begin = move |robot: &mut Robot, missions: &Missions| {
             let begun = robot.begin(&event, missions);
             let thinker = match &begun {
@@ -254,7 +241,7 @@ impl<S: Store> Runner<S> {
         if let Some(Planning { plans, .. }) = &mut planning
             // `timeout` with zero would accept the result of a search that ends within its first millisecond.
             && !patience.is_zero()
-            && let Ok(plans) = tokio::time::timeout(patience, plans).await
+            && let Ok(Some(plans)) = tokio::time::timeout(patience, join(plans)).await
         {
             let (result, estimate) = plans.ok_or_else(panicked)?;
             (thoughts, self.estimate, planning) = (Some(result), Some(estimate), None);
@@ -286,19 +273,20 @@ impl<S: Store> Runner<S> {
             let think = move || timing.timed(|| thinker.think());
             shared.threads.search(&mission, estimate, think).await
         };
-        Planning { search, plans: plans.boxed() }
+        // A task of its own, because a search holds a place, which it has to give up also while its robot waits for the log.
+        Planning { search, plans: [plans].into_iter().collect() }
     }
 
     fn follow(&mut self, planning: Option<Planning>) {
         if let Some(Planning { search, plans }) = planning {
             self.search.begin(search);
-            self.plans = Some(plans);
+            self.plans = plans;
         }
     }
 
     /// Publishes the plans of the search in a decision that completes the decisions without a plan.
     async fn conclude(&mut self, plans: Plans) {
-        self.plans = None;
+        self.used = Instant::now();
         let is_cancelled = self.search.end();
         let Some((thoughts, estimate)) = plans else { return self.suspend(PANICKED) };
         if is_cancelled || self.loaded.is_none() {
@@ -398,11 +386,13 @@ impl<S: Store> Runner<S> {
         self.is_kept &= !is_decided;
         let mut last = None;
         if let Some(Loaded { robot, .. }) = &self.loaded {
-            self.is_pending = robot.is_pending();
-            self.search.update(self.is_pending.then(|| robot.question()));
+            let planning = &self.shared.counts.planning;
+            self.pending =
+                robot.is_pending().then(|| self.pending.take().unwrap_or_else(|| Count::new(planning)));
+            self.search.update(self.pending.as_ref().map(|_| robot.question()));
             last = is_decided.then_some(robot.event);
         }
-        if !self.is_pending {
+        if self.pending.is_none() {
             self.search.reset();
         }
         // The events of a suspended robot stay in the log, also those before a refused retirement.
@@ -418,7 +408,7 @@ impl<S: Store> Runner<S> {
                 self.shared.counts.decided.fetch_add(u64::from(sequence.is_some()), Ordering::Relaxed);
             }
             Outcome::Undecided(Undecided::Refused(refused)) => {
-                self.shared.refuse(refused.name(), Some((&self.subject, refused.to_string())));
+                self.shared.refuse(refused.into(), Some((&self.subject, refused.to_string())));
             }
             Outcome::Undecided(Undecided::Faulted(why)) => self.suspend(&why),
         }
@@ -426,8 +416,8 @@ impl<S: Store> Runner<S> {
 
     fn suspend(&mut self, why: &str) {
         self.loaded = None;
-        self.is_kept |= self.is_pending;
-        (self.is_pending, self.is_suspended) = (false, true);
+        self.is_kept |= self.pending.take().is_some();
+        self.is_suspended = true;
         self.search.reset();
         metrics::counter!("metaplan_fleet_faulted_total").increment(1);
         let Address { partition, robot } = &self.address;
@@ -438,7 +428,7 @@ impl<S: Store> Runner<S> {
 
     async fn discard(&mut self) {
         (self.obsolete, self.since) = (0, None);
-        let last = self.handled - u64::from(self.is_pending || self.is_kept);
+        let last = self.handled - u64::from(self.pending.is_some() || self.is_kept);
         if self.shared.store.discard(&self.subject, last).await.is_err() {
             // Another attempt follows.
             (self.obsolete, self.since) = (1, Some(Instant::now()));
@@ -446,12 +436,9 @@ impl<S: Store> Runner<S> {
     }
 }
 
-/// Waits for the plans of a search. Never completes without a search.
-async fn join(plans: &mut Option<BoxFuture<'static, Plans>>) -> Plans {
-    match plans {
-        Some(plans) => plans.await,
-        None => std::future::pending().await,
-    }
+/// Waits for the plans of a search. Returns `None` without a search.
+async fn join(plans: &mut JoinSet<Plans>) -> Option<Plans> {
+    Some(plans.join_next().await?.ok().flatten())
 }
 
 /// Waits until a time. Never completes without one.
@@ -486,14 +473,10 @@ mod tests {
         Missions::read(&folder).unwrap_or_else(|errors| panic!("{errors}"))
     }
 
-    fn runner(
-        store: Local,
-        missions: Missions,
-        settings: Settings,
-    ) -> (mpsc::UnboundedSender<Queued>, Runner<Local>) {
-        let (sender, queue) = mpsc::unbounded_channel();
+    fn runner(store: Local, missions: Missions, settings: Settings) -> Runner<Local> {
         let shared = Arc::new(Shared::new(store, missions, "w".to_owned(), settings));
-        (sender, Runner::new(shared, Address { partition: 0, robot: "r".to_owned() }, queue))
+        let inbox = Arc::new(Inbox::new(&shared.counts.waiting));
+        Runner::new(shared, Address { partition: 0, robot: "r".to_owned() }, inbox)
     }
 
     #[tokio::test]
@@ -501,12 +484,11 @@ mod tests {
         let folder = tempfile::tempdir().expect("a directory");
         let store = log(folder.path());
         let message = Message { subject: "0.r", id: "", after: None, payload: br#"{"event": "tick"}"# };
-        let sequence = store.append(Stream::Events, message).await.expect("it is the first one").sequence;
+        store.append(Stream::Events, message).await.expect("it is the first one");
         let settings = Settings { discard_within: Duration::from_millis(10), ..Settings::default() };
-        let (sender, mut runner) = runner(store.clone(), missions(), settings);
-        runner.plans = Some(std::future::pending().boxed());
-        let waiting = Count::new(&Arc::default());
-        assert!(sender.send(Queued { sequence, event: None, waiting }).is_ok());
+        let mut runner = runner(store.clone(), missions(), settings);
+        runner.plans.spawn(std::future::pending());
+        runner.inbox.push(store.next("0.r", 0).await.expect("it can be read").expect("it exists"));
         let (_drain, drain) = watch::channel(false);
         let run = tokio::spawn(Box::new(runner).run(drain));
         while store.end(Stream::Events, 0).await.expect("it can be read") > 0 {
@@ -530,12 +512,12 @@ mod tests {
         let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
         let message = Message { subject: "0.r", id: "", after: Some(0), payload: &payload };
         store.append(Stream::Decisions, message).await.expect("it is the first one");
-        let (_queue, mut runner) = runner(store, missions, Settings::default());
+        let mut runner = runner(store, missions, Settings::default());
         runner.load().await;
         for is_unloaded in [false, true] {
             runner.search.begin(thinker.handle());
             if is_unloaded {
-                runner.unload();
+                runner.loaded = None;
             }
             runner.load().await;
             // The numbers of both problems are 0.

@@ -1,16 +1,19 @@
 //! Log in a local directory, without a server and for a single process.
 //!
-//! All messages are in memory, and in a file of the database `redb`. Concurrent writes are combined into one
-//! transaction, which is on disk before the writes are acknowledged and become visible.
+//! The messages are in a database `redb`. Concurrent writes are combined into one transaction, which is on disk before the
+//! writes are acknowledged and become visible.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use futures::stream::{self, StreamExt as _};
 use metaplan::message::Message as Diagnostic;
-use redb::{Database, ReadableDatabase as _, ReadableTable as _, Table, TableDefinition};
+use redb::{
+    Database, ReadTransaction, ReadableDatabase as _, ReadableTable, Table, TableDefinition, WriteTransaction,
+};
 use tokio::sync::{broadcast, mpsc, oneshot, watch};
 
 use super::{Fault, Message, Receipt, Store, Stored, Stream, Subscription, failed};
@@ -19,14 +22,20 @@ use crate::wire::{Address, Presence};
 const FILE: &str = "fleet.redb";
 
 /// Version of the tables.
-const FORMAT: u64 = 2;
+const FORMAT: u64 = 3;
 
 /// Maximum number of writes in one transaction.
 const BATCH: usize = 4096;
 
-/// Type of a stored message: (subject, id, time, payload). The key is (stream, sequence number).
-type Parts = (&'static str, &'static str, u64, &'static [u8]);
-const MESSAGES: TableDefinition<'static, (u8, u64), Parts> = TableDefinition::new("messages");
+/// Stream, subject and sequence number of a message.
+type Key = (u8, &'static str, u64);
+/// Id, time and payload of a message.
+type Parts = (&'static str, u64, &'static [u8]);
+const MESSAGES: TableDefinition<'static, Key, Parts> = TableDefinition::new("messages");
+/// Subjects by stream, partition and sequence number. Messages without an address have the partition [`u32::MAX`].
+const ORDER: TableDefinition<'static, (u8, u32, u64), &str> = TableDefinition::new("order");
+/// Sequence numbers of events by message id.
+const IDS: TableDefinition<'static, &str, u64> = TableDefinition::new("ids");
 /// Counters by name: the version of the tables, the number of partitions, and the last sequence number of each
 /// stream.
 const NUMBERS: TableDefinition<'static, &str, u64> = TableDefinition::new("numbers");
@@ -37,7 +46,7 @@ pub struct Local(Arc<Inner>);
 
 #[derive(Debug)]
 struct Inner {
-    messages: Arc<RwLock<Messages>>,
+    database: Arc<Database>,
     partitions: u32,
     lease: Duration,
     requests: mpsc::UnboundedSender<(Write, oneshot::Sender<Answer>)>,
@@ -73,19 +82,18 @@ impl Local {
         };
         std::fs::create_dir_all(directory).map_err(|error| wrong(&error))?;
         let database = Database::create(directory.join(FILE)).map_err(|error| wrong(&error))?;
-        let (partitions, mut messages) = read(&database, partitions)
+        let partitions = prepare(&database, partitions)
             .map_err(|error| wrong(&error))?
             .ok_or_else(|| wrong(&"the fleet was created by an earlier version: use another directory"))?;
-        messages.history = history.max(1);
-        let messages = Arc::new(RwLock::new(messages));
+        let database = Arc::new(database);
         let (requests, mut waiting) = mpsc::unbounded_channel();
         let (writing, written) = watch::channel(0);
         let (notices, _) = broadcast::channel(1024);
-        let written_messages = Arc::clone(&messages);
+        let writer = Arc::clone(&database);
         let write_all = move || {
             let mut batch = Vec::new();
             while waiting.blocking_recv_many(&mut batch, BATCH) > 0 {
-                write(&database, &written_messages, &mut batch);
+                write(&writer, history.max(1), &mut batch);
                 writing.send_modify(|count| *count += 1);
             }
         };
@@ -94,7 +102,7 @@ impl Local {
             .spawn(write_all)
             .map_err(|error| wrong(&error))?;
         let workers = Mutex::default();
-        Ok(Self(Arc::new(Inner { messages, partitions, lease, requests, written, notices, workers })))
+        Ok(Self(Arc::new(Inner { database, partitions, lease, requests, written, notices, workers })))
     }
 
     /// Subscribes to notices about refused events and suspended robots: subject (`PARTITION.ROBOT`)
@@ -109,117 +117,14 @@ impl Local {
         answer.await.map_err(failed)?
     }
 
-    fn read<T>(&self, read: impl FnOnce(&Messages) -> T) -> Result<T, Fault> {
-        let messages = self.0.messages.read().unwrap_or_else(PoisonError::into_inner);
-        messages.failure.clone().map_or_else(|| Ok(read(&messages)), |failure| Err(failed(failure)))
+    fn read<T>(&self, read: impl FnOnce(&ReadTransaction) -> Result<T, redb::Error>) -> Result<T, Fault> {
+        self.0.database.begin_read().map_err(redb::Error::from).and_then(|view| read(&view)).map_err(failed)
     }
 }
 
-#[derive(Debug, Default)]
-struct Messages {
-    /// By stream, partition and sequence number. Messages without an address have the partition [`u32::MAX`].
-    by_partition: BTreeMap<(Stream, u32, u64), Arc<Stored>>,
-    by_subject: BTreeMap<(Stream, String), BTreeMap<u64, Arc<Stored>>>,
-    /// Events by sequence number.
-    events: BTreeMap<u64, Arc<Stored>>,
-    /// Sequence numbers of events by message id.
-    ids: BTreeMap<String, u64>,
-    /// Last sequence number of each stream.
-    last: [u64; 2],
-    /// Number of decisions that are kept of each robot.
-    history: usize,
-    /// Reason why a transaction could not be written. The database is then not used any longer.
-    failure: Option<String>,
-}
-
-impl Messages {
-    fn insert(&mut self, stream: Stream, message: Stored) {
-        let (sequence, message) = (message.sequence, Arc::new(message));
-        let partition = Address::parse(&message.subject).map_or(u32::MAX, |address| address.partition);
-        self.by_partition.insert((stream, partition, sequence), Arc::clone(&message));
-        if stream == Stream::Events {
-            self.events.insert(sequence, Arc::clone(&message));
-            self.ids.extend(message.id.clone().map(|id| (id, sequence)));
-        }
-        let subject = self.by_subject.entry((stream, message.subject.clone())).or_default();
-        subject.insert(sequence, message);
-    }
-
-    fn of_subject(&self, stream: Stream, subject: &str) -> impl DoubleEndedIterator<Item = &Arc<Stored>> {
-        self.by_subject.get(&(stream, subject.to_owned())).into_iter().flat_map(BTreeMap::values)
-    }
-
-    fn apply(&mut self, tables: &mut Tables<'_>, write: &Write) -> Result<Answer, redb::Error> {
-        let (stream, subject, id, after, payload) = match write {
-            Write::Append { stream, subject, id, after, payload } => (*stream, subject, id, after, payload),
-            Write::Discard { subject, last } => {
-                self.remove(tables, Stream::Events, subject, *last)?;
-                return Ok(Ok(Receipt { sequence: *last, is_known: true }));
-            }
-        };
-        if let Some(sequence) = self.ids.get(id) {
-            return Ok(Ok(Receipt { sequence: *sequence, is_known: true }));
-        }
-        let last = self.of_subject(stream, subject).next_back().map_or(0, |last| last.sequence);
-        if after.is_some_and(|after| after != last) {
-            return Ok(Err(Fault::Conflict));
-        }
-        let sequence = self.last[stream as usize] + 1;
-        self.last[stream as usize] = sequence;
-        tables.numbers.insert(stream.prefix(), sequence)?;
-        let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let time = u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
-        let parts = (subject.as_str(), id.as_str(), time, payload.as_slice());
-        tables.messages.insert((stream as u8, sequence), parts)?;
-        self.insert(stream, message((stream as u8, sequence), parts));
-        let obsolete = self.of_subject(stream, subject).rev().nth(self.history).map(|own| own.sequence);
-        if let (Stream::Decisions, Some(obsolete)) = (stream, obsolete) {
-            self.remove(tables, stream, subject, obsolete)?;
-        }
-        Ok(Ok(Receipt { sequence, is_known: false }))
-    }
-
-    /// Removes the messages of a subject up to and including the sequence number `last`.
-    fn remove(
-        &mut self,
-        tables: &mut Tables<'_>,
-        stream: Stream,
-        subject: &str,
-        last: u64,
-    ) -> Result<(), redb::Error> {
-        let key = (stream, subject.to_owned());
-        let Some(messages) = self.by_subject.get_mut(&key) else { return Ok(()) };
-        let later = messages.split_off(&(last + 1));
-        let removed = std::mem::replace(messages, later);
-        if messages.is_empty() {
-            self.by_subject.remove(&key);
-        }
-        let partition = Address::parse(subject).map_or(u32::MAX, |address| address.partition);
-        for (sequence, message) in removed {
-            self.by_partition.remove(&(stream, partition, sequence));
-            if stream == Stream::Events {
-                self.events.remove(&sequence);
-            }
-            self.ids.remove(message.id.as_deref().unwrap_or_default());
-            tables.messages.remove((stream as u8, sequence))?;
-        }
-        Ok(())
-    }
-}
-
-struct Tables<'t> {
-    messages: Table<'t, (u8, u64), Parts>,
-    numbers: Table<'t, &'static str, u64>,
-}
-
-fn message((_, sequence): (u8, u64), (subject, id, time, payload): (&str, &str, u64, &[u8])) -> Stored {
-    let id = (!id.is_empty()).then(|| id.to_owned());
-    Stored { sequence, subject: subject.to_owned(), id, time, payload: payload.to_owned() }
-}
-
-/// Creates missing tables, and reads all messages. Returns the number of partitions: for a new database `partitions` (at
-/// least 1), otherwise the stored number. Returns `None` for a database with tables of another version.
-fn read(database: &Database, partitions: u32) -> Result<Option<(u32, Messages)>, redb::Error> {
+/// Creates missing tables. Returns the number of partitions: for a new database `partitions` (at least 1), otherwise the
+/// stored number. Returns `None` for a database with tables of another version.
+fn prepare(database: &Database, partitions: u32) -> Result<Option<u32>, redb::Error> {
     let transaction = database.begin_write()?;
     let mut numbers = transaction.open_table(NUMBERS)?;
     let number = |name| Ok::<_, redb::Error>(numbers.get(name)?.map(|number| number.value()));
@@ -227,55 +132,115 @@ fn read(database: &Database, partitions: u32) -> Result<Option<(u32, Messages)>,
     if stored.is_some() && format != Some(FORMAT) {
         return Ok(None);
     }
-    let mut messages = Messages::default();
-    for stream in Stream::ALL {
-        messages.last[stream as usize] = number(stream.prefix())?.unwrap_or_default();
-    }
     let partitions = stored.unwrap_or_else(|| u64::from(partitions.max(1)));
     numbers.insert("partitions", partitions)?;
     numbers.insert("format", FORMAT)?;
     drop(numbers);
-    transaction.open_table(MESSAGES)?;
+    drop(Tables::open(&transaction)?);
     transaction.commit()?;
-    for entry in database.begin_read()?.open_table(MESSAGES)?.iter()? {
-        let (key, value) = entry?;
-        let stream = Stream::ALL[usize::from(key.value().0.min(1))];
-        messages.insert(stream, message(key.value(), value.value()));
-    }
-    Ok(Some((partitions as u32, messages)))
+    Ok(Some(partitions as u32))
 }
 
-/// Executes writes in one transaction. Readers see none of them before the transaction is on disk.
-fn write(
-    database: &Database,
-    messages: &RwLock<Messages>,
-    batch: &mut Vec<(Write, oneshot::Sender<Answer>)>,
-) {
-    let mut messages = messages.write().unwrap_or_else(PoisonError::into_inner);
-    let failure = messages.failure.clone();
-    let mut transact = || {
+/// Executes writes in one transaction.
+fn write(database: &Database, history: usize, batch: &mut Vec<(Write, oneshot::Sender<Answer>)>) {
+    let transact = || {
         let transaction = database.begin_write()?;
-        let mut tables =
-            Tables { messages: transaction.open_table(MESSAGES)?, numbers: transaction.open_table(NUMBERS)? };
-        let answers = batch.iter().map(|(write, _)| messages.apply(&mut tables, write));
+        let mut tables = Tables::open(&transaction)?;
+        let answers = batch.iter().map(|(write, _)| tables.apply(write, history));
         let answers = answers.collect::<Result<Vec<_>, redb::Error>>()?;
         drop(tables);
         transaction.commit()?;
         Ok::<_, redb::Error>(answers)
     };
-    let answers = match failure {
-        Some(failure) => Err(failure),
-        None => transact().map_err(|error| error.to_string()),
-    };
-    messages.failure = answers.as_ref().err().cloned();
+    let answers = transact().map_err(failed);
     for (position, (_, done)) in batch.drain(..).enumerate() {
-        let answer = match &answers {
-            Ok(answers) => answers[position].clone(),
-            Err(failure) => Err(failed(failure)),
-        };
+        let answer = answers.as_ref().map_err(Clone::clone).and_then(|answers| answers[position].clone());
         // The requesting task may have been cancelled.
         let _ = done.send(answer);
     }
+}
+
+struct Tables<'t> {
+    messages: Table<'t, Key, Parts>,
+    order: Table<'t, (u8, u32, u64), &'static str>,
+    ids: Table<'t, &'static str, u64>,
+    numbers: Table<'t, &'static str, u64>,
+}
+
+impl<'t> Tables<'t> {
+    fn open(transaction: &'t WriteTransaction) -> Result<Self, redb::Error> {
+        Ok(Self {
+            messages: transaction.open_table(MESSAGES)?,
+            order: transaction.open_table(ORDER)?,
+            ids: transaction.open_table(IDS)?,
+            numbers: transaction.open_table(NUMBERS)?,
+        })
+    }
+
+    fn apply(&mut self, write: &Write, history: usize) -> Result<Answer, redb::Error> {
+        let (stream, subject, id, after, payload) = match write {
+            Write::Append { stream, subject, id, after, payload } => (*stream, subject, id, after, payload),
+            Write::Discard { subject, last } => {
+                self.remove(Stream::Events, subject, *last)?;
+                return Ok(Ok(Receipt { sequence: *last, is_known: true }));
+            }
+        };
+        if let Some(sequence) = self.ids.get(id.as_str())? {
+            return Ok(Ok(Receipt { sequence: sequence.value(), is_known: true }));
+        }
+        let last = of_subject(&self.messages, stream, subject, 0..=u64::MAX)?.next_back().transpose()?;
+        if after.is_some_and(|after| after != last.map_or(0, |last| last.sequence)) {
+            return Ok(Err(Fault::Conflict));
+        }
+        let sequence = self.numbers.get(stream.prefix())?.map_or(1, |last| last.value() + 1);
+        self.numbers.insert(stream.prefix(), sequence)?;
+        if stream == Stream::Events && !id.is_empty() {
+            self.ids.insert(id.as_str(), sequence)?;
+        }
+        let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let time = u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
+        let parts = (id.as_str(), time, payload.as_slice());
+        self.messages.insert((stream as u8, subject.as_str(), sequence), parts)?;
+        self.order.insert((stream as u8, partition(subject), sequence), subject.as_str())?;
+        let obsolete =
+            of_subject(&self.messages, Stream::Decisions, subject, 0..=u64::MAX)?.rev().nth(history);
+        if let Some(obsolete) = obsolete.transpose()? {
+            self.remove(Stream::Decisions, subject, obsolete.sequence)?;
+        }
+        Ok(Ok(Receipt { sequence, is_known: false }))
+    }
+
+    /// Removes the messages of a subject up to and including the sequence number `last`.
+    fn remove(&mut self, stream: Stream, subject: &str, last: u64) -> Result<(), redb::Error> {
+        let messages: Vec<_> =
+            of_subject(&self.messages, stream, subject, 0..=last)?.collect::<Result<_, _>>()?;
+        for Stored { sequence, id, .. } in messages {
+            self.messages.remove((stream as u8, subject, sequence))?;
+            self.order.remove((stream as u8, partition(subject), sequence))?;
+            self.ids.remove(id.unwrap_or_default().as_str())?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the messages of a subject with sequence numbers in a range.
+fn of_subject(
+    messages: &impl ReadableTable<Key, Parts>,
+    stream: Stream,
+    subject: &str,
+    range: RangeInclusive<u64>,
+) -> Result<impl DoubleEndedIterator<Item = Result<Stored, redb::Error>>, redb::Error> {
+    let range = (stream as u8, subject, *range.start())..=(stream as u8, subject, *range.end());
+    Ok(messages.range(range)?.map(|entry| {
+        let (key, value) = entry?;
+        let ((_, subject, sequence), (id, time, payload)) = (key.value(), value.value());
+        let id = (!id.is_empty()).then(|| id.to_owned());
+        Ok(Stored { sequence, subject: subject.to_owned(), id, time, payload: payload.to_owned() })
+    }))
+}
+
+fn partition(subject: &str) -> u32 {
+    Address::parse(subject).map_or(u32::MAX, |address| address.partition)
 }
 
 impl Store for Local {
@@ -289,33 +254,34 @@ impl Store for Local {
 
     async fn follow(&self, stream: Stream, partition: u32, after: u64) -> Result<Subscription, Fault> {
         let state = (self.clone(), self.0.written.clone(), after);
-        let next = move |(store, mut written, after): (Self, watch::Receiver<u64>, u64)| async move {
+        let messages = stream::try_unfold(state, move |(store, mut written, after)| async move {
             loop {
                 written.borrow_and_update();
-                let range = (stream, partition, after + 1)..=(stream, partition, u64::MAX);
-                let first = |messages: &Messages| {
-                    messages
-                        .by_partition
-                        .range(range.clone())
+                let range = (stream as u8, partition, after + 1)..=(stream as u8, partition, u64::MAX);
+                let first = store.read(|view| {
+                    let Some(entry) = view.open_table(ORDER)?.range(range)?.next() else { return Ok(None) };
+                    let (key, subject) = entry?;
+                    let messages = view.open_table(MESSAGES)?;
+                    of_subject(&messages, stream, subject.value(), key.value().2..=u64::MAX)?
                         .next()
-                        .map(|(_, message)| Stored::clone(message))
-                };
-                match store.read(first) {
-                    Ok(Some(message)) => {
-                        let after = message.sequence;
-                        return Some((Ok(message), (store, written, after)));
-                    }
-                    Ok(None) => written.changed().await.ok()?,
-                    Err(fault) => return Some((Err(fault), (store, written, after))),
+                        .transpose()
+                })?;
+                if let Some(message) = first {
+                    let after = message.sequence;
+                    return Ok(Some((message, (store, written, after))));
                 }
+                written.changed().await.map_err(failed)?;
             }
-        };
-        Ok(stream::unfold(state, next).boxed())
+        });
+        Ok(messages.boxed())
     }
 
     async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault> {
-        let range = (stream, partition, 0)..=(stream, partition, u64::MAX);
-        self.read(|messages| messages.by_partition.range(range).next_back().map_or(0, |(key, _)| key.2))
+        let range = (stream as u8, partition, 0)..=(stream as u8, partition, u64::MAX);
+        self.read(|view| {
+            let last = view.open_table(ORDER)?.range(range)?.next_back().transpose()?;
+            Ok(last.map_or(0, |(key, _)| key.value().2))
+        })
     }
 
     async fn append(&self, stream: Stream, message: Message<'_>) -> Result<Receipt, Fault> {
@@ -329,13 +295,17 @@ impl Store for Local {
     }
 
     async fn last(&self, stream: Stream, subject: &str) -> Result<Option<Stored>, Fault> {
-        self.read(|messages| {
-            messages.of_subject(stream, subject).next_back().map(|message| Stored::clone(message))
+        self.read(|view| {
+            of_subject(&view.open_table(MESSAGES)?, stream, subject, 0..=u64::MAX)?.next_back().transpose()
         })
     }
 
-    async fn event(&self, sequence: u64) -> Result<Option<Stored>, Fault> {
-        self.read(|messages| messages.events.get(&sequence).map(|message| Stored::clone(message)))
+    async fn next(&self, subject: &str, start: u64) -> Result<Option<Stored>, Fault> {
+        self.read(|view| {
+            of_subject(&view.open_table(MESSAGES)?, Stream::Events, subject, start..=u64::MAX)?
+                .next()
+                .transpose()
+        })
     }
 
     async fn announce(&self, worker: &str, status: Option<&Presence>) -> Result<(), Fault> {

@@ -9,7 +9,6 @@ pub mod local;
 pub mod nats;
 
 use std::collections::BTreeMap;
-use std::future::Future;
 use std::time::Duration;
 
 use futures::stream::BoxStream;
@@ -100,6 +99,7 @@ fn failed(error: impl std::fmt::Display) -> Fault {
 pub type Subscription = BoxStream<'static, Result<Stored, Fault>>;
 
 /// The log of a fleet. Clones share the log.
+#[trait_variant::make(Send)]
 pub trait Store: Clone + Send + Sync + 'static {
     /// Returns the number of partitions, which never changes.
     fn partitions(&self) -> u32;
@@ -110,51 +110,33 @@ pub trait Store: Clone + Send + Sync + 'static {
 
     /// Returns the messages of a partition after a sequence number, in ascending order. The stream
     /// is endless: it waits for new messages.
-    fn follow(
-        &self,
-        stream: Stream,
-        partition: u32,
-        after: u64,
-    ) -> impl Future<Output = Result<Subscription, Fault>> + Send;
+    async fn follow(&self, stream: Stream, partition: u32, after: u64) -> Result<Subscription, Fault>;
 
     /// Returns the sequence number of the last message of a partition that exists, or 0 for an empty
     /// partition.
-    fn end(&self, stream: Stream, partition: u32) -> impl Future<Output = Result<u64, Fault>> + Send;
+    async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault>;
 
     /// Appends a message and waits until it is stored durably. Stores nothing if an earlier message
     /// has the same id. Fails with [`Fault::Conflict`] if the last message of the subject is not the
     /// one that [`Message::after`] requires.
-    fn append(
-        &self,
-        stream: Stream,
-        message: Message<'_>,
-    ) -> impl Future<Output = Result<Receipt, Fault>> + Send;
+    async fn append(&self, stream: Stream, message: Message<'_>) -> Result<Receipt, Fault>;
 
     /// Removes the events of a subject up to and including a sequence number.
-    fn discard(&self, subject: &str, last: u64) -> impl Future<Output = Result<(), Fault>> + Send;
+    async fn discard(&self, subject: &str, last: u64) -> Result<(), Fault>;
 
     /// Returns the last message of a subject, or `None` if the subject has no message.
-    fn last(
-        &self,
-        stream: Stream,
-        subject: &str,
-    ) -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
+    async fn last(&self, stream: Stream, subject: &str) -> Result<Option<Stored>, Fault>;
 
-    /// Returns the event with this sequence number, or `None` if it does not exist. The event may have any
-    /// subject.
-    fn event(&self, sequence: u64) -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
+    /// Returns the first event of a subject with at least this sequence number, or `None` if it does not exist.
+    async fn next(&self, subject: &str, start: u64) -> Result<Option<Stored>, Fault>;
 
     /// Publishes the status of a worker until it expires, or withdraws it.
-    fn announce(
-        &self,
-        worker: &str,
-        status: Option<&Presence>,
-    ) -> impl Future<Output = Result<(), Fault>> + Send;
+    async fn announce(&self, worker: &str, status: Option<&Presence>) -> Result<(), Fault>;
 
     /// Returns the status of all workers, by name.
-    fn workers(&self) -> impl Future<Output = Result<BTreeMap<String, Presence>, Fault>> + Send;
+    async fn workers(&self) -> Result<BTreeMap<String, Presence>, Fault>;
 
     /// Publishes a notice about a robot on `err.PARTITION.ROBOT`, such as the reason why an event
     /// was refused. The notice is not persistent.
-    fn notice(&self, subject: &str, text: &str) -> impl Future<Output = ()> + Send;
+    async fn notice(&self, subject: &str, text: &str);
 }

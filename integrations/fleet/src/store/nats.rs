@@ -19,7 +19,6 @@ use async_nats::jetstream::message::{PublishMessage, StreamMessage};
 use async_nats::jetstream::stream::{self, LastRawMessageError, LastRawMessageErrorKind};
 use async_nats::jetstream::{self};
 use async_nats::{Client, ConnectErrorKind, ConnectOptions, HeaderMap};
-use futures::stream::BoxStream;
 use futures::{StreamExt as _, TryStreamExt as _};
 use metaplan::message::Message as Diagnostic;
 
@@ -214,29 +213,6 @@ impl Nats {
         Ok(Ok(Self { client, context, partitions, lease, prefix, streams, workers }))
     }
 
-    /// Returns the number of messages of a stream.
-    ///
-    /// # Errors
-    /// The server cannot be reached.
-    pub async fn count(&self, stream: Stream) -> Result<u64, Fault> {
-        Ok(self.stream(stream).get_info().await.map_err(failed)?.state.messages)
-    }
-
-    /// Subscribes to notices about refused events and suspended robots: subject without `err.`
-    /// (`PARTITION.ROBOT`), and reason.
-    ///
-    /// # Errors
-    /// The server cannot be reached.
-    pub async fn notices(&self) -> Result<BoxStream<'static, (String, String)>, Fault> {
-        let prefix = format!("{}err.", self.prefix);
-        let subscriber = self.client.subscribe(format!("{prefix}*.*")).await.map_err(failed)?;
-        let refusals = subscriber.map(move |message| {
-            let subject = message.subject.strip_prefix(&prefix).unwrap_or_default().to_owned();
-            (subject, String::from_utf8_lossy(&message.payload).into_owned())
-        });
-        Ok(refusals.boxed())
-    }
-
     /// Returns the subject of a stream with this end (`PARTITION.ROBOT`), which may have wildcards.
     fn subject(&self, stream: Stream, end: &str) -> String {
         format!("{}{}.{end}", self.prefix, stream.prefix())
@@ -328,14 +304,8 @@ impl Store for Nats {
             publish = publish.expected_last_subject_sequence(after);
         }
         let subject = self.subject(kind, message.subject);
-        let bytes = message.payload.len();
-        let ack = self
-            .context
-            .send_publish(subject, publish)
-            .await
-            .map_err(|error| published(&error, bytes))?
-            .await
-            .map_err(|error| published(&error, bytes))?;
+        let publish = async { self.context.send_publish(subject, publish).await?.await };
+        let ack = publish.await.map_err(|error| published(&error, message.payload.len()))?;
         Ok(Receipt { sequence: ack.sequence, is_known: ack.duplicate })
     }
 
@@ -343,8 +313,9 @@ impl Store for Nats {
         raw(self.stream(kind).get_last_raw_message_by_subject(&self.subject(kind, subject)).await)
     }
 
-    async fn event(&self, sequence: u64) -> Result<Option<Stored>, Fault> {
-        raw(self.stream(Stream::Events).get_raw_message(sequence).await)
+    async fn next(&self, subject: &str, start: u64) -> Result<Option<Stored>, Fault> {
+        let subject = self.subject(Stream::Events, subject);
+        raw(self.stream(Stream::Events).get_first_raw_message_by_subject(&subject, start).await)
     }
 
     async fn discard(&self, subject: &str, last: u64) -> Result<(), Fault> {

@@ -61,7 +61,7 @@ fn can_mount() -> bool {
 }
 
 impl Cluster {
-    pub(super) fn begin(seed: u64) -> Self {
+    pub(super) async fn begin(seed: u64) -> Self {
         let directory =
             tempfile::Builder::new().prefix(&format!("chaos-{seed}-")).tempdir().expect("a directory");
         let clients: [u16; 3] = std::array::from_fn(|_| free_port());
@@ -72,10 +72,11 @@ impl Cluster {
         // The announced addresses are unused.
         let nobody = free_port();
         for own in 0..3 {
-            let others = (0..3).filter(|other| *other != own);
-            let list: Vec<String> = others
-                .map(|other| format!("nats://127.0.0.1:{}", wires[3 - own - other].lead(routes[other])))
-                .collect();
+            let mut list = Vec::new();
+            for other in (0..3).filter(|other| *other != own) {
+                let port = wires[3 - own - other].lead(routes[other]).await;
+                list.push(format!("nats://127.0.0.1:{port}"));
+            }
             let folder = directory.path().join(format!("s{own}"));
             fs::create_dir_all(&folder).expect("it can be made");
             let text = format!(
@@ -202,7 +203,7 @@ impl Cluster {
     /// the server `third`.
     fn part(&self, third: usize, millis: u64) {
         let [one, other] = PAIRS[third];
-        self.0.wires[third].cut();
+        self.0.wires[third].0.send_replace(true);
         std::thread::sleep(Duration::from_millis(millis));
         for (own, lost) in [(one, other), (other, one)] {
             // A busy server does not reply.
@@ -213,7 +214,7 @@ impl Cluster {
                 );
             }
         }
-        self.0.wires[third].mend();
+        self.0.wires[third].0.send_replace(false);
     }
 
     /// Injects random faults, one at a time, until `over` is true, and restores all processes.

@@ -1,55 +1,34 @@
 //! TCP connections between servers that can be cut.
 
-use std::net::{Shutdown, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use tokio::io::copy_bidirectional;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
 
-#[derive(Debug, Clone, Default)]
-pub(super) struct Wire {
-    is_cut: Arc<AtomicBool>,
-    open: Arc<Mutex<Vec<TcpStream>>>,
-}
+/// `true` while the connections are cut.
+#[derive(Debug, Default)]
+pub(super) struct Wire(pub(super) watch::Sender<bool>);
 
 impl Wire {
     /// Forwards a new local port to port `to`. Returns the new port.
-    pub(super) fn lead(&self, to: u16) -> u16 {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
+    pub(super) async fn lead(&self, to: u16) -> u16 {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port is free");
         let port = listener.local_addr().expect("it has an address").port();
-        let own = self.clone();
-        std::thread::spawn(move || {
-            for incoming in listener.incoming().flatten() {
-                // Connections to a stopped server are closed, like those over a cut connection.
-                let Ok(outgoing) = TcpStream::connect(("127.0.0.1", to)) else { continue };
-                let mut open = own.open.lock().unwrap_or_else(PoisonError::into_inner);
-                if own.is_cut.load(Ordering::SeqCst) {
-                    continue;
-                }
-                for (from, to) in [(&incoming, &outgoing), (&outgoing, &incoming)] {
-                    let (Ok(from), Ok(to)) = (from.try_clone(), to.try_clone()) else { continue };
-                    std::thread::spawn(move || carry(from, to));
-                }
-                open.extend([incoming, outgoing]);
+        let cut = self.0.subscribe();
+        tokio::spawn(async move {
+            while let Ok((mut incoming, _)) = listener.accept().await {
+                let mut cut = cut.clone();
+                tokio::spawn(async move {
+                    // Connections to a stopped server are closed, like those over a cut connection.
+                    let Ok(mut outgoing) = TcpStream::connect(("127.0.0.1", to)).await else { return };
+                    tokio::select! {
+                        biased;
+                        _ = cut.wait_for(|is_cut| *is_cut) => {}
+                        // Either end may close the connection.
+                        _ = copy_bidirectional(&mut incoming, &mut outgoing) => {}
+                    }
+                });
             }
         });
         port
     }
-
-    pub(super) fn cut(&self) {
-        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
-        self.is_cut.store(true, Ordering::SeqCst);
-        for stream in open.drain(..) {
-            // The connection may already be closed.
-            let _ = stream.shutdown(Shutdown::Both);
-        }
-    }
-
-    pub(super) fn mend(&self) {
-        self.is_cut.store(false, Ordering::SeqCst);
-    }
-}
-
-fn carry(mut from: TcpStream, mut to: TcpStream) {
-    // Either end may be closed.
-    let _ = std::io::copy(&mut from, &mut to);
-    let _ = to.shutdown(Shutdown::Both);
 }

@@ -171,7 +171,10 @@ def test_quantiles_are_those_of_the_exporter():
 
 def test_reasons_of_the_runbook_are_those_of_the_sources():
     robot = (ROOT / "integrations/fleet/src/robot.rs").read_text()
-    own = set(re.findall(r'Self::\w+ => "(\w+)",', robot)) | set(re.findall(r'\.refuse\(\s*"(\w+)"', SOURCES))
+    variants = re.findall(r"^    (\w+),$", robot.partition("pub enum Refused {")[2].partition("\n}")[0], re.MULTILINE)
+    # The names are the variants in snake case.
+    own = {re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower() for name in variants} | set(re.findall(r'\.refuse\(\s*"(\w+)"', SOURCES))
+    assert {"not_enrolled", "wrong_subject"} <= own
     section = RUNBOOK.partition("## Events are refused")[2].partition("\n## ")[0]
     assert set(re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)) - {"reason"} == own
     assert set(re.findall(r'reason!="(\w+)"', ALERTS_TEXT)) <= own

@@ -19,6 +19,16 @@ pub(super) async fn read<S: Store>(store: &S, stream: Stream, partition: u32) ->
     Ok(messages)
 }
 
+/// Returns `true` if all events are discarded.
+pub(super) async fn has_no_events<S: Store>(store: &S) -> Result<bool, Fault> {
+    for partition in 0..store.partitions() {
+        if store.end(Stream::Events, partition).await? > 0 {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
 pub(super) fn free_port() -> u16 {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
     listener.local_addr().expect("it has an address").port()

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::{Settings, Shared, serve};
+use metaplan_fleet::robot::{Begun, Robot};
 use metaplan_fleet::robots::Sender;
 use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::{Message, Store, Stored, Stream};
@@ -15,7 +16,7 @@ use tempfile::TempDir;
 use tokio::sync::{broadcast, watch};
 use tokio::task::JoinHandle;
 
-use super::common::read;
+use super::common::{has_no_events, read};
 use super::scripts;
 
 pub(super) const ENROL: &str = r#"{"event": "enrol", "mission": "ugv"}"#;
@@ -33,7 +34,7 @@ const LIMIT: Duration = Duration::from_secs(600);
 
 /// Settings with which each decision contains its plan, so that the answers do not depend on the speed of this machine.
 pub(super) fn patient() -> Settings {
-    Settings { patience: LIMIT, look: Duration::from_millis(1), ..Settings::default() }
+    Settings { patience: LIMIT, ..Settings::default() }
 }
 
 pub(super) fn shared<S: Store>(store: S, name: &str, settings: Settings) -> Arc<Shared<S>> {
@@ -86,6 +87,20 @@ impl Fleet {
         self.append(Stream::Events, Message { subject, id, after: None, payload }).await
     }
 
+    /// Appends the enrolment of the robot `r`, and the decision of an owner that ends before it has found the plan. Returns
+    /// the sequence number of the enrolment.
+    pub(super) async fn enrol_without_plan(&self, missions: &Missions) -> u64 {
+        let enrolment = self.append_event("0.r", "", ENROL.as_bytes()).await;
+        let mut robot = Robot::default();
+        let Ok(Begun::Search(search)) = robot.begin(&event(enrolment, ENROL), missions) else {
+            panic!("a search is necessary")
+        };
+        let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
+        let message = Message { subject: "0.r", id: "", after: Some(0), payload: &payload };
+        self.append(Stream::Decisions, message).await;
+        enrolment
+    }
+
     /// Appends events without ids. Returns their sequence numbers.
     pub(super) async fn tell(&self, robot: &str, events: &[impl AsRef<str>]) -> Vec<u64> {
         let subject = Address::of(robot, self.store.partitions()).to_string();
@@ -125,12 +140,7 @@ impl Fleet {
     /// Returns `true` if there are no events. Unlike [`all`](Self::all), it does not wait for events that are discarded
     /// meanwhile.
     pub(super) async fn has_no_events(&self) -> bool {
-        for partition in 0..self.store.partitions() {
-            if self.store.end(Stream::Events, partition).await.expect("it can be read") > 0 {
-                return false;
-            }
-        }
-        true
+        has_no_events(&self.store).await.expect("it can be read")
     }
 
     /// Waits until all events are handled, their plans are found, and the events are discarded.
@@ -143,12 +153,12 @@ impl Fleet {
         until(&what, async || self.all(Stream::Decisions).await.len() >= count).await;
     }
 
-    pub(super) fn own(&self, name: &str, settings: Settings) -> Owner {
-        Owner::start(shared(self.store.clone(), name, settings))
+    pub(super) fn own(&self, name: &str, settings: Settings) -> Running {
+        Running::owner(shared(self.store.clone(), name, settings))
     }
 
     pub(super) async fn work(&self, name: &str, settings: Settings, count: usize) {
-        let worker = Worker::start(shared(self.store.clone(), name, settings));
+        let worker = Running::worker(shared(self.store.clone(), name, settings));
         self.decided(count).await;
         worker.stop().await;
     }
@@ -192,42 +202,29 @@ impl Client {
     }
 }
 
-/// An owner of the first partition, which is aborted at the end.
-pub(super) struct Owner(watch::Sender<bool>, JoinHandle<()>);
+/// A running worker, or an owner of the first partition only, which is aborted when it is dropped.
+pub(super) struct Running(watch::Sender<bool>, JoinHandle<()>);
 
-impl Owner {
-    pub(super) fn start<S: Store>(shared: Arc<Shared<S>>) -> Self {
+impl Running {
+    pub(super) fn worker<S: Store>(shared: Arc<Shared<S>>) -> Self {
+        let (stop, stopped) = watch::channel(false);
+        Self(stop, tokio::spawn(worker::run(shared, stopped)))
+    }
+
+    pub(super) fn owner<S: Store>(shared: Arc<Shared<S>>) -> Self {
         let (drain, receiver) = watch::channel(false);
         Self(drain, tokio::spawn(serve(shared, 0, receiver)))
     }
 
-    pub(super) async fn drain(mut self) {
+    pub(super) async fn stop(mut self) {
         self.0.send_replace(true);
         let end = tokio::time::timeout(LIMIT, &mut self.1).await;
         end.expect("it ends in time").expect("no panic");
     }
 }
 
-impl Drop for Owner {
+impl Drop for Running {
     fn drop(&mut self) {
         self.1.abort();
-    }
-}
-
-pub(super) struct Worker(watch::Sender<bool>, JoinHandle<()>);
-
-impl Worker {
-    pub(super) fn start<S: Store>(shared: Arc<Shared<S>>) -> Self {
-        let (stop, stopped) = watch::channel(false);
-        Self(stop, tokio::spawn(worker::run(shared, stopped)))
-    }
-
-    pub(super) fn abort(self) {
-        self.1.abort();
-    }
-
-    pub(super) async fn stop(self) {
-        self.0.send_replace(true);
-        self.1.await.expect("a worker ends in order");
     }
 }

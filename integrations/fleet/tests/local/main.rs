@@ -18,10 +18,10 @@ use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::Settings;
 use metaplan_fleet::robots::status;
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Message, Store as _, Stream};
+use metaplan_fleet::store::{Fault, Message, Store as _, Stream};
 use serde_json::json;
 
-use harness::{Client, ENROL, Fleet, Worker, patient, shared, until};
+use harness::{Client, ENROL, Fleet, Running, patient, shared, until};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn robots_are_answered_as_by_a_loop_of_their_own() {
@@ -29,7 +29,11 @@ async fn robots_are_answered_as_by_a_loop_of_their_own() {
     let mut robots = Vec::new();
     for (number, scenario) in scripts::SCENARIOS.into_iter().cycle().take(8).enumerate() {
         let mut robot = Client::play(&format!("r-{number}"), scenario, number as u64, 40);
-        robot.send_all(&fleet).await;
+        // Nonsense is answered with an error.
+        robot.events.insert(3, "nonsense".to_owned());
+        let unknown = json!({"event": "component_status", "component": "nobody", "status": "FALSE"});
+        robot.events.insert(4, unknown.to_string());
+        robot.sequences = fleet.send(&robot.name, "s", &robot.events).await;
         robots.push(robot);
     }
     let count: usize = robots.iter().map(|robot| robot.events.len()).sum();
@@ -41,7 +45,9 @@ async fn robots_are_answered_as_by_a_loop_of_their_own() {
     let mut workers = BTreeSet::new();
     for robot in &robots {
         robot.verify(&fleet).await;
-        workers.extend(fleet.of(&robot.name).await.into_iter().map(|decided| decided.worker));
+        let made = fleet.of(&robot.name).await;
+        assert!(made[3..5].iter().all(|decided| decided.answers[0]["answer"] == "error"));
+        workers.extend(made.into_iter().map(|decided| decided.worker));
     }
     assert_eq!(fleet.all(Stream::Decisions).await.len(), count);
     assert_eq!(fleet.all(Stream::Events).await, [], "decided events are discarded");
@@ -97,7 +103,7 @@ async fn distributed(fleet: &Fleet, expected: &[usize]) {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn partitions_are_shared_and_taken_over() {
     let fleet = Fleet::with(8, 100, LEASE);
-    let begin = |name: &str| Worker::start(shared(fleet.store.clone(), name, patient()));
+    let begin = |name: &str| Running::worker(shared(fleet.store.clone(), name, patient()));
     let mut robot = Client::play("r", ("ugv", "kinect_comes_and_goes"), 5, 30);
     robot.send(&fleet, 10).await;
     let first = begin("first");
@@ -106,7 +112,7 @@ async fn partitions_are_shared_and_taken_over() {
     distributed(&fleet, &[4, 4]).await;
     robot.send(&fleet, 20).await;
     // A worker is aborted, so its status expires.
-    second.abort();
+    drop(second);
     robot.send_all(&fleet).await;
     distributed(&fleet, &[8]).await;
     fleet.decided(robot.events.len()).await;
@@ -128,13 +134,15 @@ fn one_process_has_a_directory() {
 }
 
 #[tokio::test]
-async fn only_the_last_decisions_of_a_robot_are_kept() {
+async fn only_the_last_decisions_of_a_robot_are_kept_each_after_its_predecessor() {
     let fleet = Fleet::with(1, 3, Duration::from_secs(1));
     let mut last = 0;
     for number in 0..10_u8 {
         let payload = [number];
         let message = Message { subject: "0.r", id: "", after: Some(last), payload: &payload };
         last = fleet.append(Stream::Decisions, message).await;
+        // Another decision after the same predecessor is rejected.
+        assert_eq!(fleet.store.append(Stream::Decisions, message).await, Err(Fault::Conflict));
         let other = Message { subject: "0.s", after: None, ..message };
         fleet.append(Stream::Decisions, other).await;
         fleet.append(Stream::Events, other).await;
@@ -143,10 +151,11 @@ async fn only_the_last_decisions_of_a_robot_are_kept() {
     let kept: Vec<u8> =
         kept.iter().filter(|message| message.subject == "0.r").map(|message| message.payload[0]).collect();
     assert_eq!(kept, [7, 8, 9]);
-    let seventh = fleet.store.event(7).await.expect("it can be read").expect("it exists");
-    assert_eq!((seventh.sequence, seventh.payload), (7, vec![6]));
+    let next = async |start| fleet.store.next("0.s", start).await.expect("it can be read");
+    assert_eq!(next(7).await.map(|event| (event.sequence, event.payload)), Some((7, vec![6])));
     fleet.store.discard("0.s", 7).await.expect("it can be written");
-    assert_eq!(fleet.store.event(7).await, Ok(None));
+    assert_eq!(next(0).await.map(|event| event.sequence), Some(8));
+    assert_eq!(next(11).await, None);
     assert_eq!(fleet.all(Stream::Events).await.len(), 3);
 }
 

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use metaplan_fleet::partition::Settings;
 use metaplan_fleet::robot::{Begun, Robot};
-use metaplan_fleet::store::{Message, Store as _, Stream};
+use metaplan_fleet::store::{Store as _, Stored};
 
-use super::harness::{Client, ENROL, Fleet, MISSIONS, RETIRE, TICK, event, patient};
+use super::harness::{Client, Fleet, MISSIONS, RETIRE, TICK, event, patient};
 use super::scripts;
 
 /// Settings with which a decision waits this number of milliseconds for its plan.
@@ -51,7 +51,8 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
     }
     let mut random = fastrand::Rng::with_seed(5);
     for owner in 0..100 {
-        let settings = Settings { discard_every: random.usize(1..5), warm: 3, ..hasty(random.u64(..3)) };
+        let patience = [0, 1, 2, 600_000][random.usize(..4)];
+        let settings = Settings { discard_every: random.usize(1..12), warm: 3, ..hasty(patience) };
         let _owner = fleet.own("owner", settings);
         // Later owners live longer, so that they also find plans on a slow machine.
         tokio::time::sleep(Duration::from_millis(random.u64(1..150) + owner * owner / 50)).await;
@@ -77,15 +78,7 @@ async fn reactions_do_not_wait_for_plans_and_each_plan_is_found_by_some_owner() 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_refused_event_starts_the_search_for_a_pending_plan() {
     let fleet = Fleet::new(1);
-    let enrolment = fleet.append_event("0.r", "", ENROL.as_bytes()).await;
-    let mut robot = Robot::default();
-    let Ok(Begun::Search(search)) = robot.begin(&event(enrolment, ENROL), &MISSIONS) else {
-        panic!("a search is necessary")
-    };
-    let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
-    fleet
-        .append(Stream::Decisions, Message { subject: "0.r", id: "", after: Some(0), payload: &payload })
-        .await;
+    let enrolment = fleet.enrol_without_plan(&MISSIONS).await;
     fleet.store.discard("0.r", enrolment).await.expect("it is our own directory");
     fleet.append_event("0.r", "s:1", TICK.as_bytes()).await;
     let _owner = fleet.own("owner", Settings { discard_every: 1, ..hasty(0) });
@@ -108,4 +101,34 @@ fn the_plan_of_an_enrolment_stays_pending_for_the_next_owner() {
         panic!("no search is necessary")
     };
     assert!(decided.planning);
+}
+
+#[test]
+fn the_stored_state_does_not_grow_with_the_events() {
+    for (mission, component) in [("camara_like", "c_kinect"), ("ugv", "c_kinect"), ("uuv", "c_thruster_1")] {
+        let enrolment = format!(r#"{{"event": "enrol", "mission": "{mission}"}}"#);
+        let status = |status| {
+            format!(r#"{{"event": "component_status", "component": "{component}", "status": "{status}"}}"#)
+        };
+        let [lost, well] = [status("FALSE"), status("OK")];
+        let mut robot = Robot::default();
+        let size = |number: u64| {
+            let text = match number {
+                1 => &enrolment,
+                number if number.is_multiple_of(100) => &lost,
+                number if number % 100 == 50 => &well,
+                _ => TICK,
+            };
+            let event = Stored { id: Some(format!("r:{number}")), ..event(number, text) };
+            let decided = robot.decide(&event, &MISSIONS).expect("it is not refused");
+            serde_json::to_vec(&decided).expect("plain data").len()
+        };
+        let sizes: Vec<usize> = (1..=600).map(size).collect();
+        let [first, last] = [100..300, 300..600].map(|numbers| sizes[numbers].iter().max());
+        // Numbers of events have further digits.
+        assert!(
+            last <= first.map(|first| first + 8).as_ref() && last < Some(&4000),
+            "{mission}: {first:?}, {last:?}"
+        );
+    }
 }

@@ -1,7 +1,7 @@
 //! Tests with missions that change: robots finish on the former version, change to the new one, or are
 //! suspended until their version is back or they are retired.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
@@ -10,13 +10,13 @@ use std::time::Duration;
 
 use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::{Settings, Shared};
-use metaplan_fleet::robot::{Begun, Robot, Undecided};
+use metaplan_fleet::robot::{Robot, Undecided};
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Message, Stored, Stream};
+use metaplan_fleet::store::{Stored, Stream};
 use metaplan_fleet::wire::{Decided, State};
 use tempfile::TempDir;
 
-use super::harness::{Client, ENROL, Fleet, LOST, Owner, RETIRE, TICK, Worker, event, heard, patient, until};
+use super::harness::{Client, ENROL, Fleet, LOST, RETIRE, Running, TICK, event, heard, patient, until};
 use super::scripts;
 
 /// A fleet with one partition, and directories with two versions of the mission `ugv`: the original, and one with a
@@ -55,14 +55,14 @@ impl Versions {
     }
 
     async fn work(&self, names: &[&str], count: usize) {
-        let worker = Worker::start(self.shared(names));
+        let worker = Running::worker(self.shared(names));
         self.fleet.decided(count).await;
         worker.stop().await;
     }
 
     async fn refuse(&self, names: &[&str], count: u64) {
         let shared = self.shared(names);
-        let worker = Worker::start(Arc::clone(&shared));
+        let worker = Running::worker(Arc::clone(&shared));
         until("refusals", async || shared.counts.refused.load(Ordering::Relaxed) >= count).await;
         worker.stop().await;
     }
@@ -73,22 +73,7 @@ impl Versions {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn robots_finish_on_the_version_with_which_they_were_enrolled() {
-    let versions = Versions::new();
-    let fleet = &versions.fleet;
-    let mut robot = Client::play("r", ("ugv", "kinect_comes_and_goes"), 3, 30);
-    robot.send(fleet, 10).await;
-    versions.work(&["old"], 10).await;
-    robot.send_all(fleet).await;
-    fleet.tell("s", &[ENROL]).await;
-    versions.work(&["new", "old"], robot.events.len() + 1).await;
-    robot.verify(fleet).await;
-    let digests = [fleet.of("r").await, fleet.of("s").await].map(|made| made[0].state.digest.clone());
-    assert!(!digests[0].is_empty() && !digests[1].is_empty() && digests[0] != digests[1]);
-}
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_robot_without_its_version_waits_for_it_and_delays_nobody() {
+async fn a_robot_waits_for_the_version_with_which_it_was_enrolled_and_delays_nobody() {
     let versions = Versions::new();
     let fleet = &versions.fleet;
     let [mut robot, mut other] = [("r", 3), ("s", 4)]
@@ -96,7 +81,7 @@ async fn a_robot_without_its_version_waits_for_it_and_delays_nobody() {
     robot.send(fleet, 10).await;
     versions.work(&["old"], 10).await;
     robot.send(fleet, 15).await;
-    let worker = Worker::start(versions.shared(&["new"]));
+    let worker = Running::worker(versions.shared(&["new"]));
     other.send(fleet, 10).await;
     fleet.decided(20).await;
     // These events reach a robot that is suspended already.
@@ -112,6 +97,9 @@ async fn a_robot_without_its_version_waits_for_it_and_delays_nobody() {
         versions.work(names, robot.events.len() + other.events.len()).await;
     }
     robot.verify(fleet).await;
+    let digests = [fleet.of("r").await, fleet.of("s").await]
+        .map(|made| made.into_iter().map(|decided| decided.state.digest).collect::<BTreeSet<_>>());
+    assert!(digests[0].len() == 1 && digests[1].len() == 1 && digests[0] != digests[1], "{digests:?}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -152,17 +140,9 @@ async fn a_refused_retirement_discards_no_event_of_a_suspended_robot() {
 async fn a_pending_plan_is_found_after_the_robot_was_suspended() {
     let versions = Versions::new();
     let fleet = &versions.fleet;
-    let sequences = fleet.tell("r", &[ENROL]).await;
-    // The decision of an owner that ends before it has found the plan.
-    let (enrolment, mut robot) = (fleet.all(Stream::Events).await.remove(0), Robot::default());
-    let Ok(Begun::Search(search)) = robot.begin(&enrolment, &versions.missions(&["old"])) else {
-        panic!("a search is necessary")
-    };
-    let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
-    let message = Message { subject: "0.r", id: "", after: Some(0), payload: &payload };
-    fleet.append(Stream::Decisions, message).await;
+    let enrolment = fleet.enrol_without_plan(&versions.missions(&["old"])).await;
     versions.refuse(&["new"], 1).await;
-    assert_eq!(versions.kept().await, sequences, "the event is kept for the plan");
+    assert_eq!(versions.kept().await, [enrolment], "the event is kept for the plan");
     versions.work(&["new", "old"], 2).await;
     assert!(fleet.of("r").await[1].planned);
 }
@@ -253,13 +233,13 @@ async fn owners_with_different_versions_agree_on_what_was_decided() {
                 events.push(event);
             }
             texts.extend(versions.fleet.tell("r", &events).await.into_iter().zip(events));
-            let _owner = Owner::start(Arc::clone(&shared[random.usize(..4)]));
+            let _owner = Running::owner(Arc::clone(&shared[random.usize(..4)]));
             tokio::time::sleep(Duration::from_millis(random.u64(1..60))).await;
         }
         let end = [RETIRE, ENROL, TICK];
         texts.extend(versions.fleet.tell("r", &end).await.into_iter().zip(end));
         let last = texts.last_key_value().map(|(sequence, _)| *sequence);
-        let worker = Worker::start(versions.shared(&["new", "old"]));
+        let worker = Running::worker(versions.shared(&["new", "old"]));
         let is_over = async || versions.fleet.of("r").await.last().map(|decided| decided.event) == last;
         until("the last event is not decided", is_over).await;
         worker.stop().await;
@@ -274,7 +254,7 @@ async fn only_ids_are_kept_of_retired_robots() {
     let mut count = 0;
     for _ in 0..2 {
         let shared = versions.shared(&["old"]);
-        let worker = Worker::start(Arc::clone(&shared));
+        let worker = Running::worker(Arc::clone(&shared));
         for robot in ["a", "b", "c"] {
             count += fleet.tell(robot, &[ENROL, TICK, RETIRE]).await.len();
         }
