@@ -9,8 +9,11 @@ use task::limits::Limits;
 
 use crate::certificate::trim;
 
-/// Maximum number of conflicts for formulas whose numbers have at most [`REFERENCE_WIDTH`] bits.
-const CONFLICT_LIMIT: u64 = 20_000;
+/// Maximum number of conflicts for the formula whose number of steps does not depend on a potential. Writing a certificate
+/// should take at most about five times as long as planning, and the claim rests on the argument without a formula.
+const SPENT_CONFLICT_LIMIT: u64 = 500;
+/// Maximum number of conflicts for the formula with the fewest steps.
+const CONFLICT_LIMIT: u64 = 2_000;
 /// Number of bits up to which the full conflict limit applies. For wider numbers, the limit is inversely
 /// proportional to the width, because each conflict costs more.
 const REFERENCE_WIDTH: usize = 32;
@@ -32,7 +35,7 @@ pub struct Attempt {
 pub fn attempts(claimed: &Claimed<'_>, limits: &Limits) -> Result<Vec<Attempt>, String> {
     let StepBounds { spent, potential } = claimed.step_bounds(&|| limits.reached())?;
     let spent = spent.filter(|steps| *steps > potential);
-    let spent = spent.map(|steps| Attempt { steps, conflicts: CONFLICT_LIMIT });
+    let spent = spent.map(|steps| Attempt { steps, conflicts: SPENT_CONFLICT_LIMIT });
     Ok(spent.into_iter().chain([Attempt { steps: potential, conflicts: CONFLICT_LIMIT }]).collect())
 }
 
