@@ -1,6 +1,5 @@
 //! Writes the certificates of Pareto fronts. `verify::front` describes what they prove.
 
-use std::fs;
 use std::path::Path;
 
 use num_bigint::BigInt;
@@ -13,7 +12,7 @@ use ::verify::front::{MAX_POINTS, can_be_limited, member_directory, member_probl
 use ::verify::manifest::{DOMAIN, FRONT, FRONT_FORMAT, Front, FrontManifest, PROBLEM};
 
 use super::knowledge;
-use super::write::{Contents, Ground, listed, write_manifest, write_with};
+use super::write::{Contents, Ground, write_files, write_manifest, write_with};
 use crate::file::create_directory;
 use crate::message::{Errors, Message};
 use crate::mission::{Mission, Planning as _};
@@ -74,9 +73,7 @@ pub fn write_front(
         Message::at("M109", &name, None, format!("the directory cannot be written: {}", error.kind()))
     };
     let whole = create_directory(directory).map_err(failed)?;
-    for (name, text) in &files {
-        fs::write(whole.path().join(name), text).map_err(failed)?;
-    }
+    let listed = write_files(whole.path(), &files).map_err(failed)?;
     let member = |position: usize| member_directory(whole.path(), position);
     let mut previous = None;
     for ((point, [first, second]), position) in sorted.iter().zip(0..) {
@@ -86,8 +83,7 @@ pub fn write_front(
     }
     let problem = member_problem(problem, &objectives, false, None);
     write_member(&member(sorted.len()), (mission, &problem), (last, least), limits)?;
-    let files = listed(whole.path(), files.iter().map(|(name, _)| *name)).map_err(failed)?;
-    write_manifest(whole.path(), &FrontManifest { format: FRONT_FORMAT.to_owned(), files })
+    write_manifest(whole.path(), &FrontManifest { format: FRONT_FORMAT.to_owned(), files: listed })
         .map_err(failed)?;
     whole.commit().map_err(failed)
 }

@@ -4,25 +4,26 @@ use std::fs;
 use std::io::{BufRead, BufReader, BufWriter};
 use std::path::Path;
 
-use certificate::{Faithful, StepBound, check, witness};
+use certificate::{Claimed, Faithful, GroundTask, witnessed};
 use num_rational::BigRational;
-use pddl::ast::Problem;
+use pddl::ast::{Domain, Problem};
 use pddl::{print_domain, print_problem};
 use planner::{
-    Certificate, ExactTask, Limits, NoCertificate, RefutationOutputs, Solution, Task, certify, certify_exact,
-    refute,
+    Certificate, ExactTask, Limits, NoCertificate, RefutationOutputs, Solution, Task, attempts, certify,
+    certify_exact, refute,
 };
 use serde::Serialize;
+use tracing::info_span;
 
 use ::verify::Claim;
-use ::verify::digest::digest_of;
+use ::verify::digest::{digest, digest_of};
 use ::verify::files::text;
 use ::verify::manifest::{
     ARGUMENT, DOMAIN, FORMAT, FORMULA, File, HINTS, LEGEND, Manifest, PLAN, PROBLEM, PROOF, PROOF_LIMIT,
     Refutation, STREAMED, TASK, TEXT_LIMIT, WITNESS,
 };
 use ::verify::plan::plan as executed;
-use ::verify::task::{read_pddl, same_task};
+use ::verify::task::read_pddl;
 
 use super::knowledge;
 use crate::file::create_directory;
@@ -99,18 +100,22 @@ pub(super) fn write_with(
     let Contents { mission, problem, task, solution, plan } = *contents;
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
     let name = directory.display().to_string();
-    let mut certificate = task.certify(solution, limits).map_err(|reason| wrong(&reason))?;
+    let mut certificate =
+        info_span!("labels").in_scope(|| task.certify(solution, limits)).map_err(|reason| wrong(&reason))?;
     let (domain_text, problem_text) = (print_domain(mission.domain()), print_problem(problem));
-    let mut witness = compared((&domain_text, &problem_text), &certificate.task, limits);
-    if witness.is_err()
+    let (domain, read_problem) = read_pddl(&domain_text, &problem_text).map_err(|reason| wrong(&reason))?;
+    let stop = || limits.reached();
+    let compared = |task: &str| compared(&domain, &read_problem, task, &stop);
+    let mut outcome = compared(&certificate.task);
+    if outcome.is_err()
         && let Some(reduced) = certificate.of_false_goal()
     {
-        let witness_of_goal = compared((&domain_text, &problem_text), &reduced.task, limits);
-        if witness_of_goal.is_ok() {
-            (certificate, witness) = (reduced, witness_of_goal);
+        let outcome_of_goal = compared(&reduced.task);
+        if outcome_of_goal.is_ok() {
+            (certificate, outcome) = (reduced, outcome_of_goal);
         }
     }
-    let witness = witness.map_err(|reason| wrong(&reason))?;
+    let (read_task, witness) = outcome.map_err(|reason| wrong(&reason))?;
     let mut files = vec![
         (DOMAIN, domain_text),
         (PROBLEM, problem_text),
@@ -136,32 +141,31 @@ pub(super) fn write_with(
     // The files are written to a temporary directory that is renamed at the end.
     let whole = create_directory(directory).map_err(failed)?;
     let metric = contents.metric(limits).map_err(|reason| wrong(&reason))?;
+    let claimed = Claimed::read(&read_task, text(&files, ARGUMENT), metric.as_ref());
+    let claimed = claimed.map_err(|fault| wrong(&fault))?;
     // A certificate with an argument that `verify` would reject is not written.
-    check(text(&files, TASK), text(&files, ARGUMENT), metric.as_ref()).map_err(|fault| wrong(&fault))?;
+    info_span!("check").in_scope(|| claimed.check(&stop)).map_err(|fault| wrong(&fault))?;
     let refutation =
-        refutation(whole.path(), (text(&files, TASK), text(&files, ARGUMENT)), metric.as_ref(), limits)
-            .map_err(failed)?;
-    for (name, text) in &files {
-        fs::write(whole.path().join(name), text).map_err(failed)?;
-    }
+        info_span!("refute").in_scope(|| refutation(whole.path(), &claimed, limits)).map_err(failed)?;
     // Without a refutation, its files do not exist.
     let streamed = STREAMED.into_iter().filter(|_| matches!(refutation, Refutation::Steps(_)));
-    let names = files.iter().map(|(name, _)| *name).chain(streamed);
-    let listed = listed(whole.path(), names).map_err(failed)?;
+    let mut listed = write_files(whole.path(), &files).map_err(failed)?;
+    for name in streamed {
+        let (bytes, sha256) = digest_of(&whole.path().join(name)).map_err(failed)?;
+        listed.push(File { name: name.to_owned(), bytes, sha256 });
+    }
     let manifest = Manifest { format: FORMAT.to_owned(), claim, refutation, files: listed };
     write_manifest(whole.path(), &manifest).map_err(failed)?;
     whole.commit().map_err(failed)
 }
 
-pub(super) fn listed<'n>(
-    directory: &Path,
-    names: impl Iterator<Item = &'n str>,
-) -> std::io::Result<Vec<File>> {
-    let list = |name: &str| {
-        let (bytes, sha256) = digest_of(&directory.join(name))?;
-        Ok(File { name: name.to_owned(), bytes, sha256 })
+/// Writes texts to files of a directory. Returns their entries in a manifest.
+pub(super) fn write_files(directory: &Path, files: &[(&str, String)]) -> std::io::Result<Vec<File>> {
+    let write = |(name, text): &(&str, String)| {
+        fs::write(directory.join(name), text)?;
+        Ok(File { name: (*name).to_owned(), bytes: text.len() as u64, sha256: digest(text.as_bytes()) })
     };
-    names.map(list).collect()
+    files.iter().map(write).collect()
 }
 
 pub(super) fn write_manifest(directory: &Path, manifest: &impl Serialize) -> std::io::Result<()> {
@@ -169,28 +173,26 @@ pub(super) fn write_manifest(directory: &Path, manifest: &impl Serialize) -> std
     fs::write(directory.join("manifest.json"), text + "\n")
 }
 
-/// Creates the witness (an over-approximation of the reachable states). Uses it to check that the ground task agrees
-/// with the PDDL files, as `verify` does. Returns an error if they differ or cannot be compared.
-fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Result<String, String> {
-    let (domain, problem) = read_pddl(domain, problem)?;
-    let witness =
-        witness(&domain, &problem, task, &|| limits.reached()).map_err(|verdict| match verdict {
-            Faithful::No(difference) => difference.to_string(),
-            Faithful::Undecided(cause) => cause.to_string(),
-            Faithful::Yes { .. } => "no witness".to_owned(),
-        })?;
-    same_task(&domain, &problem, (task, &witness), &|| limits.reached())?;
-    Ok(witness)
+/// Reads a ground task and creates its witness (an over-approximation of the reachable states). Uses it to check that
+/// the task agrees with the PDDL files, as `verify` does. Returns an error if they differ or cannot be compared.
+fn compared(
+    domain: &Domain,
+    problem: &Problem,
+    task: &str,
+    stop: &dyn Fn() -> bool,
+) -> Result<(GroundTask, String), String> {
+    let _span = info_span!("compare").entered();
+    let task = GroundTask::read(task).map_err(|fault| fault.to_string())?;
+    let witness = witnessed(domain, problem, &task, stop).map_err(|verdict| match verdict {
+        Faithful::No(difference) => difference.to_string(),
+        Faithful::Undecided(cause) => cause.to_string(),
+        Faithful::Yes { .. } => "no witness".to_owned(),
+    })?;
+    Ok((task, witness))
 }
 
-/// Writes the formula "there is a better plan" (without `metric`: "there is a plan") and its refutation to files in
-/// `directory`. Returns `Refutation::None` with the reasons if no refutation is found or its proof is too large.
-fn refutation(
-    directory: &Path,
-    documents: (&str, &str),
-    metric: Option<&BigRational>,
-    limits: &Limits,
-) -> std::io::Result<Refutation> {
+/// Writes the formula "there is a better plan" and its refutation to files in `directory`. Returns `Refutation::None` with the reasons if no refutation is found or its proof is too large.
+fn refutation(directory: &Path, claimed: &Claimed<'_>, limits: &Limits) -> std::io::Result<Refutation> {
     let create = |name: &str| fs::File::create(directory.join(name)).map(BufWriter::new);
     let written_draft = || {
         let file = fs::File::open(directory.join(DRAFT))?;
@@ -199,8 +201,13 @@ fn refutation(
     let remove = |names: &[&str]| names.iter().try_for_each(|name| fs::remove_file(directory.join(name)));
     let size = |name: &str| fs::metadata(directory.join(name)).map(|file| file.len());
     let mut reasons = Vec::new();
-    // The second bound on the number of steps is tried only if the first one gives no refutation.
-    for by in [StepBound::Spent, StepBound::Potential] {
+    let attempts = attempts(claimed, limits).unwrap_or_else(|reason| {
+        reasons.push(reason);
+        Vec::new()
+    });
+    let has_files = !attempts.is_empty();
+    // A later formula is tried only if the earlier ones have no refutation.
+    for attempt in attempts {
         let outputs = RefutationOutputs {
             formula: &mut create(FORMULA)?,
             legend: &mut create(LEGEND)?,
@@ -209,17 +216,19 @@ fn refutation(
             proof: &mut create(PROOF)?,
             hints: &mut create(HINTS)?,
         };
-        let refuted = refute(documents, metric, by, outputs, limits);
+        let refuted = refute(claimed, attempt, outputs, limits);
         remove(&[DRAFT])?;
         match refuted {
-            Ok(_) if size(PROOF)?.max(size(HINTS)?) > PROOF_LIMIT => {
+            Ok(()) if size(PROOF)?.max(size(HINTS)?) > PROOF_LIMIT => {
                 reasons.push(format!("the proof has more than {PROOF_LIMIT} bytes"));
             }
-            Ok(steps) => return Ok(Refutation::Steps(steps)),
+            Ok(()) => return Ok(Refutation::Steps(attempt.steps)),
             Err(reason) => reasons.push(reason),
         }
     }
-    remove(&STREAMED)?;
+    if has_files {
+        remove(&STREAMED)?;
+    }
     reasons.dedup();
     Ok(Refutation::None(reasons.join("; ")))
 }

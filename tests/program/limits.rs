@@ -1,6 +1,8 @@
 //! Tests of limits and signals in early phases, and of certificates: write errors, and statements about the
 //! scope of a certificate.
 
+#[cfg(unix)]
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -213,6 +215,81 @@ fn verification_respects_the_time_limit() {
         assert_eq!(outcome.status, 30, "{outcome:#?}");
         assert!(outcome.stdout.contains("limits      failed"), "{outcome:#?}");
     }
+}
+
+/// A task with many instances of actions and a short plan. Returns the domain and the problem.
+#[cfg(unix)]
+pub fn doors(places: u32) -> (String, String) {
+    let domain = "(define (domain doors) (:requirements :action-costs) (:predicates (at ?p) (open ?p)) (:functions (total-cost))
+        (:action go :parameters (?a ?b) :precondition (and (at ?a) (open ?b))
+          :effect (and (not (at ?a)) (at ?b) (increase (total-cost) 2)))
+        (:action unlock :parameters (?p) :precondition (not (open ?p))
+          :effect (and (open ?p) (increase (total-cost) 1))))";
+    let objects: String = (0..places).map(|number| format!(" p{number}")).collect();
+    let problem = format!(
+        "(define (problem p) (:domain doors) (:objects{objects}) (:init (at p0) (= (total-cost) 0)) (:goal (at p1))
+           (:metric minimize (total-cost)))"
+    );
+    (domain.to_owned(), problem)
+}
+
+/// Asserts that the directory has no certificate, or one that is verified, and no temporary files. Removes the
+/// certificate `c`. Returns `true` if there was one.
+#[cfg(unix)]
+pub fn assert_no_incomplete_certificate(directory: &Path) -> bool {
+    let names = std::fs::read_dir(directory).expect("a directory");
+    let names: Vec<_> = names.map(|entry| entry.expect("an entry").file_name()).collect();
+    let is_temporary = |name: &std::ffi::OsString| name.to_string_lossy().starts_with('.');
+    assert!(!names.iter().any(is_temporary), "{names:?}");
+    let exists = directory.join("c").exists();
+    if exists {
+        let outcome = verify_in(directory, &["c"]);
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+        std::fs::remove_dir_all(directory.join("c")).expect("a certificate");
+    }
+    exists
+}
+
+/// The plan is shown before its certificate is written.
+#[cfg(unix)]
+#[test]
+fn signals_leave_no_incomplete_certificate() {
+    use std::io::Read as _;
+
+    use test_resources::{Resource, missing};
+    if is_ignored(2) {
+        missing(Resource::Signals, "the signal -INT is ignored");
+        return;
+    }
+    let directory = tempfile::tempdir().expect("a directory");
+    let (domain, problem) = doors(80);
+    std::fs::write(directory.path().join("domain.pddl"), domain).expect("a file");
+    std::fs::write(directory.path().join("problem.pddl"), problem).expect("a file");
+    let mut interrupted = 0;
+    for delay in [0, 50, 400, 1_600] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
+            .args(["plan", "domain.pddl", "problem.pddl", "--certificate", "c"])
+            .current_dir(directory.path())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let mut output = child.stdout.take().expect("a pipe");
+        output.read_exact(&mut [0]).expect("the plan");
+        std::thread::sleep(Duration::from_millis(delay));
+        let status = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+        assert!(status.success());
+        let status = wait(&mut child).unwrap_or_else(|| panic!("it continues after {delay} ms and -INT"));
+        let mut messages = String::new();
+        child.stderr.take().expect("a pipe").read_to_string(&mut messages).expect("text");
+        let exists = assert_no_incomplete_certificate(directory.path());
+        let expected = if exists { 0 } else { 3 };
+        assert_eq!(status.code(), Some(expected), "after {delay} ms: {messages}");
+        assert!(exists || messages.contains("M120"), "after {delay} ms: {messages}");
+        interrupted += usize::from(!exists);
+    }
+    assert!(interrupted > 0, "every certificate was written before the signal");
 }
 
 /// A certificate with an additional rule proves a different claim. Its rule file must not be reported as

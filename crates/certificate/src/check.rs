@@ -15,7 +15,7 @@ use crate::model::TASK_FORMAT;
 use crate::model::{Model, Operator, Quantity};
 use crate::references;
 use crate::semantics::{State, holds_without_numbers};
-use crate::table::{Table, check_need, check_potential};
+use crate::table::{Table, TableFault, check_need, check_potential};
 
 /// Upper limit on the number of non-dominated combinations of designs, summed over all operators. Operators with equal
 /// slots, exclusions, costs and numeric expressions are counted once.
@@ -23,6 +23,8 @@ const CHOICE_LIMIT: usize = 1 << 20;
 /// Upper limit on the number of pairwise comparisons of design combinations, summed over all
 /// operators; about 1 s of work.
 const COMPARISON_LIMIT: usize = 1 << 25;
+/// Number of labels between two polls of the limits.
+const POLL_INTERVAL: usize = 64;
 /// Work of enumerating one combination of designs, in units of one comparison.
 const COMBINATION_COST: usize = 2;
 
@@ -79,6 +81,87 @@ pub enum Fault {
         /// Position of the operator in the task, from 0.
         operator: usize,
     },
+    /// The check was cancelled.
+    #[error("the check was stopped before its end")]
+    Stopped,
+}
+
+/// A ground task that was read from its document. All references in it are checked.
+#[derive(Debug)]
+pub struct GroundTask {
+    pub(super) model: Model,
+}
+
+impl GroundTask {
+    /// Reads the document of a ground task.
+    ///
+    /// # Errors
+    /// The document is malformed.
+    pub fn read(text: &str) -> Result<Self, Fault> {
+        let model: Model = read("the task", text)?;
+        require_format("the task", &model.format, TASK_FORMAT)?;
+        references::task(&model).map_err(|reason| form("the task", reason))?;
+        Ok(Self { model })
+    }
+}
+
+/// A ground task with an argument and a claim. All references in the argument are checked.
+#[derive(Debug)]
+pub struct Claimed<'c> {
+    pub(super) model: &'c Model,
+    pub(super) argument: Argument,
+    /// The claim as a sum of operator costs. `None` claims that there is no plan.
+    pub(super) cost: Option<Integer>,
+}
+
+impl<'c> Claimed<'c> {
+    /// Reads the document of an argument about a task. `claim` is the claimed value of the metric; without it, the
+    /// claim is that the task has no plan.
+    ///
+    /// # Errors
+    /// The document is malformed, or no plan of the task can have the claimed value.
+    pub fn read(task: &'c GroundTask, argument: &str, claim: Option<&BigRational>) -> Result<Self, Fault> {
+        let model = &task.model;
+        let argument: Argument = read("the argument", argument)?;
+        require_format("the argument", &argument.format, ARGUMENT_FORMAT)?;
+        references::argument(model, &argument).map_err(|reason| form("the argument", reason))?;
+        let cost = claim.map(|claim| cost(model, claim)).transpose()?;
+        Ok(Self { model, argument, cost })
+    }
+
+    /// Checks that no plan of the task has a better metric value than the claim. Without a claimed value, checks that
+    /// the task has no plan. `stop` returns `true` to cancel the check.
+    ///
+    /// # Errors
+    /// The first fault found.
+    pub fn check(&self, stop: &dyn Fn() -> bool) -> Result<Checked, Fault> {
+        let Self { model, argument, cost } = self;
+        let mut potentials = Vec::new();
+        for (potential, position) in argument.potentials.iter().zip(0..) {
+            let table = Table::new(model, &potential.pattern, &potential.values);
+            check_potential(model, &table, stop).map_err(|fault| fault.at("potential", position))?;
+            potentials.push(table);
+        }
+        let mut needs = Vec::new();
+        for (need, position) in argument.needs.iter().zip(0..) {
+            let table = Table::new(model, &need.pattern, &need.values);
+            check_need(model, need.number, &table, stop).map_err(|fault| fault.at("need", position))?;
+            needs.push((need.number as usize, table));
+        }
+        let mut labels: FxHashMap<&[u32], Vec<(&[Integer], &Integer)>> = FxHashMap::default();
+        for label in &argument.labels {
+            labels.entry(&label.0).or_default().push((&label.1, &label.2));
+        }
+        let monotone = model.more_never_hurts();
+        let choices = choices(model, monotone, stop)?;
+        let checker = Checker { choices, model, cost: cost.as_ref(), potentials, needs, labels, monotone };
+        checker.induction(argument, stop)?;
+        Ok(Checked {
+            labels: argument.labels.len(),
+            potentials: argument.potentials.len(),
+            needs: argument.needs.len(),
+        })
+    }
 }
 
 /// Checks that no plan of the ground task `task` has a better metric value than `claim`. Without a
@@ -87,69 +170,27 @@ pub enum Fault {
 /// # Errors
 /// The first fault found.
 pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<Checked, Fault> {
-    let (model, argument, cost) = parse(task, argument, claim)?;
-    let mut potentials = Vec::new();
-    for (potential, position) in argument.potentials.iter().zip(0..) {
-        let table = Table::new(&model, &potential.pattern, &potential.values);
-        check_potential(&model, &table).map_err(|reason| Fault::Bound {
-            table: "potential",
-            position,
-            reason,
-        })?;
-        potentials.push(table);
-    }
-    let mut needs = Vec::new();
-    for (need, position) in argument.needs.iter().zip(0..) {
-        let table = Table::new(&model, &need.pattern, &need.values);
-        check_need(&model, need.number, &table).map_err(|reason| Fault::Bound {
-            table: "need",
-            position,
-            reason,
-        })?;
-        needs.push((need.number as usize, table));
-    }
-    let mut labels: FxHashMap<&[u32], Vec<(&[Integer], &Integer)>> = FxHashMap::default();
-    for label in &argument.labels {
-        labels.entry(&label.0).or_default().push((&label.1, &label.2));
-    }
-    let monotone = model.more_never_hurts();
-    let checker = Checker {
-        choices: choices(&model, monotone)?,
-        model: &model,
-        cost,
-        potentials,
-        needs,
-        labels,
-        monotone,
-    };
-    checker.induction(&argument)?;
-    Ok(Checked {
-        labels: argument.labels.len(),
-        potentials: argument.potentials.len(),
-        needs: argument.needs.len(),
-    })
+    Claimed::read(&GroundTask::read(task)?, argument, claim)?.check(&|| false)
 }
 
-/// Parses both documents and checks the references in them. Also returns the claim, converted to a
-/// sum of operator costs.
-pub(super) fn parse(
-    task: &str,
-    argument: &str,
-    claim: Option<&BigRational>,
-) -> Result<(Model, Argument, Option<Integer>), Fault> {
-    let model: Model = read("the task", task)?;
-    let argument: Argument = read("the argument", argument)?;
-    for (document, format, expected) in
-        [("the task", &model.format, TASK_FORMAT), ("the argument", &argument.format, ARGUMENT_FORMAT)]
-    {
-        if format != expected {
-            return Err(form(document, format!("format `{format}`, where `{expected}` is expected")));
+fn require_format(document: &'static str, format: &str, expected: &str) -> Result<(), Fault> {
+    if format == expected {
+        return Ok(());
+    }
+    Err(form(document, format!("format `{format}`, where `{expected}` is expected")))
+}
+
+impl TableFault {
+    fn at(self, table: &'static str, position: usize) -> Fault {
+        match self {
+            Self::NoBound(reason) => Fault::Bound { table, position, reason },
+            Self::Stopped => Fault::Stopped,
         }
     }
-    references::task(&model).map_err(|reason| form("the task", reason))?;
-    references::argument(&model, &argument).map_err(|reason| form("the argument", reason))?;
-    let cost = claim.map(|claim| cost(&model, claim)).transpose()?;
-    Ok((model, argument, cost))
+}
+
+fn stopped(stop: &dyn Fn() -> bool) -> Result<(), Fault> {
+    if stop() { Err(Fault::Stopped) } else { Ok(()) }
 }
 
 fn form(document: &'static str, reason: String) -> Fault {
@@ -172,7 +213,7 @@ type Choice = (Vec<u32>, Integer);
 
 struct Checker<'c> {
     model: &'c Model,
-    cost: Option<Integer>,
+    cost: Option<&'c Integer>,
     potentials: Vec<Table<'c>>,
     needs: Vec<(usize, Table<'c>)>,
     labels: FxHashMap<&'c [u32], Vec<(&'c [Integer], &'c Integer)>>,
@@ -181,7 +222,7 @@ struct Checker<'c> {
 }
 
 impl Checker<'_> {
-    fn induction(&self, argument: &Argument) -> Result<(), Fault> {
+    fn induction(&self, argument: &Argument, stop: &dyn Fn() -> bool) -> Result<(), Fault> {
         // An empty clause in the goal means that grounding has found the goal unreachable.
         if self.cost.is_none() && self.model.goal.clauses.iter().any(Vec::is_empty) {
             return Ok(());
@@ -190,11 +231,14 @@ impl Checker<'_> {
             return Err(Fault::Initial);
         }
         let index = Index::new(self.model);
-        for (label, position) in argument.labels.iter().zip(0..) {
+        for (label, position) in argument.labels.iter().zip(0_usize..) {
+            if position.is_multiple_of(POLL_INTERVAL) {
+                stopped(stop)?;
+            }
             let state = self.model.state(&label.0, &label.1);
             let paid = &label.2;
             if self.model.holds(&self.model.goal, &state, &[], &[])
-                && self.cost.as_ref().is_none_or(|cost| paid < cost)
+                && self.cost.is_none_or(|cost| paid < cost)
             {
                 return Err(Fault::Goal(position));
             }
@@ -221,7 +265,7 @@ impl Checker<'_> {
 
     /// Returns `true` if a lower bound prunes a state that is reached at cost `paid`, or if a label covers it.
     fn is_covered(&self, state: &State, paid: &Integer) -> bool {
-        let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
+        let too_expensive = self.potentials.iter().any(|potential| match (potential.at(state), self.cost) {
             (None, _) => true,
             (Some(more), Some(cost)) => paid + more >= *cost,
             (Some(_), None) => false,
@@ -247,7 +291,7 @@ impl Checker<'_> {
 /// other one satisfies, and leaves every number at least as high. (If larger numbers may hurt, the
 /// numbers must be equal.) A label that covers the successor by the dominating combination then
 /// also covers the successor by the dominated one.
-fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
+fn choices(model: &Model, monotone: bool, stop: &dyn Fn() -> bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut fronts: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
     let mut count = 0_usize;
     let mut comparisons = 0;
@@ -259,6 +303,7 @@ fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
         let front = if let Some(known) = fronts.get(&key) {
             Rc::clone(known)
         } else {
+            stopped(stop)?;
             let front = front(model, operator, &quantities, monotone, &mut comparisons)?;
             count = count.saturating_add(front.len());
             if count > CHOICE_LIMIT {

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use num_rational::BigRational;
 
 use crate::argument::{Argument, Label, Need, Potential};
-use crate::check::{Fault, parse};
+use crate::check::{Claimed, Fault, GroundTask};
 use crate::integer::Integer;
 use crate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
 
@@ -26,7 +26,8 @@ pub fn verification_conditions(
     argument: &str,
     claim: Option<&BigRational>,
 ) -> Result<Option<String>, Fault> {
-    let (model, argument, cost) = parse(task, argument, claim)?;
+    let task = GroundTask::read(task)?;
+    let Claimed { model, argument, cost } = Claimed::read(&task, argument, claim)?;
     if !model.axioms.is_empty() {
         return Ok(None);
     }

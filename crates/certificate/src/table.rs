@@ -15,6 +15,15 @@ use crate::integer::Integer;
 use crate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
 use crate::semantics::State;
 
+/// The reason why a table is not accepted.
+#[derive(Debug)]
+pub(super) enum TableFault {
+    /// The table is not a lower bound. Contains the entry or operator that violates it.
+    NoBound(String),
+    /// The check was cancelled.
+    Stopped,
+}
+
 /// A lower bound; `None` is infinity.
 type Bound<'b> = Option<&'b Integer>;
 
@@ -113,28 +122,36 @@ impl<'t> Table<'t> {
         targets
     }
 
-    /// Calls `check` with the bounds before and after each abstract transition of each operator. An
-    /// operator without facts and effects on the pattern's variables is checked only once. Returns an
-    /// error if `check` returns `false`.
-    fn each_transition(
+    /// Calls `check` with the bounds before and after each abstract transition of each operator, and with the result of
+    /// `prepare` for the operator. An operator without facts and effects on the pattern's variables is checked only
+    /// once. Returns an error if `check` returns `false`.
+    fn each_transition<P>(
         &self,
         model: &Model,
-        check: &dyn Fn(&Operator, Bound<'_>, Bound<'_>) -> bool,
-    ) -> Result<(), String> {
+        prepare: &dyn Fn(&Operator) -> P,
+        check: &dyn Fn(&P, Bound<'_>, Bound<'_>) -> bool,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<(), TableFault> {
+        // An operator that touches no variable leads from each combination to itself, so checking the greatest finite
+        // value suffices.
+        let greatest = self.values.iter().flatten().max();
         for (operator, position) in model.operators.iter().zip(0..) {
             if !self.touches(operator) {
-                // The operator leads from each combination to itself, so checking the greatest finite
-                // value suffices.
-                let finite = self.values.iter().flatten().max();
-                if finite.is_some() && !check(operator, finite, finite) {
-                    return Err(format!("operator {position}, which changes no variable of the table"));
+                if greatest.is_some() && !check(&prepare(operator), greatest, greatest) {
+                    let reason = format!("operator {position}, which changes no variable of the table");
+                    return Err(TableFault::NoBound(reason));
                 }
                 continue;
             }
+            if stop() {
+                return Err(TableFault::Stopped);
+            }
+            let prepared = prepare(operator);
             for values in self.matching(&operator.condition.facts) {
                 for target in self.targets(operator, &values) {
-                    if !check(operator, self.value(&values), self.value(&target)) {
-                        return Err(format!("operator {position} leads from {values:?} to {target:?}"));
+                    if !check(&prepared, self.value(&values), self.value(&target)) {
+                        let reason = format!("operator {position} leads from {values:?} to {target:?}");
+                        return Err(TableFault::NoBound(reason));
                     }
                 }
             }
@@ -147,15 +164,18 @@ fn at_most(left: Bound<'_>, right: Bound<'_>, step: &Integer) -> bool {
     right.is_none_or(|right| left.is_some_and(|left| *left <= right + step))
 }
 
-pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), String> {
+pub(super) fn check_potential(
+    model: &Model,
+    table: &Table<'_>,
+    stop: &dyn Fn() -> bool,
+) -> Result<(), TableFault> {
     for values in table.matching(&model.goal.facts) {
         if !at_most(table.value(&values), Some(&Integer::ZERO), &Integer::ZERO) {
-            return Err(format!("the goal may hold at {values:?}"));
+            return Err(TableFault::NoBound(format!("the goal may hold at {values:?}")));
         }
     }
-    table.each_transition(model, &|operator, before, after| {
-        at_most(before, after, &model.least(&operator.cost))
-    })
+    let least = |operator: &Operator| model.least(&operator.cost);
+    table.each_transition(model, &least, &|least, before, after| at_most(before, after, least), stop)
 }
 
 /// The effect of an operator on a number, as far as needs depend on it.
@@ -188,9 +208,14 @@ fn implies(model: &Model, guard: &Linear, wanted: &Linear) -> bool {
         && (same_designs || model.most(&guard.quantity) <= model.least(&wanted.quantity))
 }
 
-pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Result<(), String> {
+pub(super) fn check_need(
+    model: &Model,
+    number: u32,
+    table: &Table<'_>,
+    stop: &dyn Fn() -> bool,
+) -> Result<(), TableFault> {
     if table.values.iter().flatten().any(Integer::is_negative) {
-        return Err("it is negative".into());
+        return Err(TableFault::NoBound("it is negative".into()));
     }
     let required = model
         .goal
@@ -202,13 +227,15 @@ pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Resul
         .max(Integer::ZERO);
     for values in table.matching(&model.goal.facts) {
         if !at_most(table.value(&values), Some(&required), &Integer::ZERO) {
-            return Err(format!("the goal may hold at {values:?}"));
+            return Err(TableFault::NoBound(format!("the goal may hold at {values:?}")));
         }
     }
-    table.each_transition(model, &|operator, before, after| match use_of(model, operator, number) {
-        Use::Lowers(least) => at_most(before, after, &least),
+    let use_of = |operator: &Operator| use_of(model, operator, number);
+    let check = |operator_use: &Use, before: Bound<'_>, after: Bound<'_>| match operator_use {
+        Use::Lowers(least) => at_most(before, after, least),
         Use::Other => before.is_some_and(Integer::is_zero) || (before.is_none() && after.is_none()),
-    })
+    };
+    table.each_transition(model, &use_of, &check, stop)
 }
 
 /// Returns the lower bound on a number that a comparison implies, if the comparison has the form

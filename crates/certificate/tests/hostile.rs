@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use metaplan_certificate::{
-    Cause, Difference, Faithful, Fault, StepBound, check, faithful, formula, witness,
+    Cause, Claimed, Difference, Faithful, Fault, GroundTask, check, faithful, witness,
 };
 use num_rational::BigRational;
 use pddl::Source;
@@ -181,7 +181,12 @@ fn formulas_do_not_cover_derived_variables_without_rules() {
     let argument = r#"{"format": "metaplan-argument/1", "potentials": [{"pattern": [], "values": [0]}], "needs": [],
       "labels": []}"#;
     let claim = BigRational::from_integer(2.into());
-    let reason = |task: &str| formula((task, argument), Some(&claim), StepBound::Spent).err();
+    let reason = |task: &str| {
+        let task = GroundTask::read(task).expect("a task");
+        let claimed = Claimed::read(&task, argument, Some(&claim)).expect("an argument");
+        let steps = claimed.step_bounds(&|| false).expect("a bound").spent.expect("a bound");
+        claimed.formula(steps, &|| false).err()
+    };
     assert_eq!(reason(&task), None);
     let derived = task.replace(r#""basic": 3"#, r#""basic": 2"#);
     assert_eq!(reason(&derived).as_deref(), Some("derived predicates are not covered"));

@@ -28,7 +28,8 @@ mod planner;
 mod replan;
 
 pub use self::certificate::{
-    Certificate, NoCertificate, Outputs as RefutationOutputs, certify, certify_exact, refute,
+    Attempt, Certificate, NoCertificate, Outputs as RefutationOutputs, attempts, certify, certify_exact,
+    refute,
 };
 pub use alternatives::{Alternatives, Forced, alternatives};
 pub use configuration::{Assignment, DesignChoice, configure};

@@ -7,9 +7,9 @@ use std::cell::RefCell;
 use std::io::Write;
 use std::rc::Rc;
 
-use certificate::{Inputs, StepBound, check_refutation};
+use certificate::{Claimed, GroundTask, Inputs, check_refutation};
 use metaplan_planner::{
-    Certificate, Config, GroundConfig, Limits, RefutationOutputs, certify, ground, optimize, refute,
+    Attempt, Certificate, Config, GroundConfig, Limits, RefutationOutputs, certify, ground, optimize, refute,
 };
 use num_rational::BigRational;
 use pddl::{Source, read};
@@ -27,6 +27,13 @@ fn certified(seed: u64) -> Option<(Certificate, BigRational)> {
     let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
     let solution = optimize(&task, &Config::default(), &mut |_| {});
     Some((certify(&task, &solution, &Limits::none()).expect("a certificate"), cost))
+}
+
+/// Field of [`certificate::StepBounds`] that gives the number of steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum StepBound {
+    Spent,
+    Potential,
 }
 
 #[derive(Clone, Default)]
@@ -55,7 +62,15 @@ fn refutation(
     claim: &BigRational,
     by: StepBound,
 ) -> Result<(usize, Files), String> {
-    let documents = (certificate.task.as_str(), certificate.argument.as_str());
+    let task = GroundTask::read(&certificate.task).map_err(|fault| fault.to_string())?;
+    let claimed =
+        Claimed::read(&task, &certificate.argument, Some(claim)).map_err(|fault| fault.to_string())?;
+    let bounds = claimed.step_bounds(&|| false)?;
+    let steps = match by {
+        StepBound::Spent => bounds.spent.ok_or("a cheaper plan may have more than 64 steps")?,
+        StepBound::Potential => bounds.potential,
+    };
+    let attempt = Attempt { steps, conflicts: 20_000 };
     let files: [Memory; 4] = Default::default();
     let [mut formula, mut legend, mut proof, mut hints] = files.clone();
     let draft = Memory::default();
@@ -67,7 +82,7 @@ fn refutation(
         proof: &mut proof,
         hints: &mut hints,
     };
-    let steps = refute(documents, Some(claim), by, outputs, &Limits::none())?;
+    refute(&claimed, attempt, outputs, &Limits::none())?;
     Ok((steps, files.map(|file| file.text())))
 }
 

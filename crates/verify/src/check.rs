@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use certificate::verification_conditions;
+use certificate::{GroundTask, verification_conditions};
 use mission::Mission;
 use mission::message::{Errors, Message};
 
@@ -50,15 +50,14 @@ impl<'a> Verifier<'a> {
         Self { mission: mission.into(), ..self }
     }
 
-    /// Sets a time limit, counted from this call, for the checks of the ground task and of the
-    /// plan. The other checks do not observe it. A check that reaches the limit fails.
+    /// Sets a time limit, counted from this call, for the checks of the ground task, the plan, the argument and
+    /// the formula. The other checks do not observe it. A check that reaches the limit fails.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         Self { until: Instant::now().checked_add(time), ..self }
     }
 
-    /// Sets a function that the checks of the ground task and of the plan poll. When `stop` returns
-    /// `true`, the check fails.
+    /// Sets a function that the checks of [`Self::time_limit`] poll. When `stop` returns `true`, the check fails.
     #[must_use]
     pub fn stop(self, stop: impl Fn() -> bool + 'a) -> Self {
         Self { stop: Box::new(stop), ..self }
@@ -156,7 +155,8 @@ fn conditions(directory: &Path, stop: &dyn Fn() -> bool) -> Result<String, Messa
         Claim::Optimal { metric } => {
             let (domain, problem) = read_pddl(text(DOMAIN), text(PROBLEM)).map_err(wrong)?;
             let (_, timed) =
-                same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop).map_err(wrong)?;
+                same_task(&domain, &problem, (&GroundTask::read(text(TASK)), text(WITNESS)), stop)
+                    .map_err(wrong)?;
             Some(plan(&domain, &problem, timed, text(PLAN), metric, stop).map_err(wrong)?.1)
         }
     };

@@ -4,8 +4,7 @@ use std::fs;
 use std::io::BufReader;
 use std::path::Path;
 
-use certificate::{Checked, Inputs, check, check_refutation};
-use num_rational::BigRational;
+use certificate::{Checked, Claimed, GroundTask, Inputs, REFUTATION_PARTS};
 use pddl::ast::{Domain, Problem};
 
 use crate::files::text;
@@ -33,7 +32,8 @@ pub(crate) fn parts(
         Err(reason) => return vec![VerifiedPart { part: "files", result: Err(reason) }],
     };
     let mut parts = origin_parts(contents, &domain, &problem);
-    let (task_result, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop) {
+    let task = GroundTask::read(text(TASK));
+    let (task_result, timed) = match same_task(&domain, &problem, (&task, text(WITNESS)), stop) {
         Ok((summary, timed)) => (Ok(summary), timed),
         // If the task is rejected, it is unknown whether plans are measured by time. The plan is then checked
         // as if they were not; the certificate is rejected in any case.
@@ -58,15 +58,19 @@ pub(crate) fn parts(
             Some(value)
         }
     };
-    let checked = check(text(TASK), text(ARGUMENT), metric.as_ref());
+    let claimed = task.as_ref().map_err(Clone::clone);
+    let claimed = claimed.and_then(|task| Claimed::read(task, text(ARGUMENT), metric.as_ref()));
+    let checked = claimed.as_ref().map_err(Clone::clone).and_then(|claimed| claimed.check(stop));
     let result = checked.map_err(|fault| fault.to_string()).map(|Checked { labels, potentials, needs }| {
         format!("no plan is better: induction over {labels} labels, with {potentials} potentials and {needs} needs")
     });
     parts.push(VerifiedPart { part: "argument", result });
-    let documents = (text(TASK), text(ARGUMENT));
-    parts.extend(match refutation {
-        Refutation::Steps(steps) => refuted(directory, documents, metric.as_ref(), *steps),
-        Refutation::None(reason) => {
+    parts.extend(match (refutation, &claimed) {
+        (Refutation::Steps(steps), Ok(claimed)) => refuted(directory, claimed, *steps, stop),
+        (Refutation::Steps(_), Err(fault)) => {
+            REFUTATION_PARTS.map(|part| VerifiedPart { part, result: Err(fault.to_string()) }).into()
+        }
+        (Refutation::None(reason), _) => {
             vec![VerifiedPart {
                 part: "formula",
                 result: Ok(format!("none, the claim rests on the argument: {reason}")),
@@ -100,9 +104,9 @@ pub(crate) fn written(contents: &[(String, String)]) -> Option<knowledge::Knowle
 
 fn refuted(
     directory: &Path,
-    documents: (&str, &str),
-    metric: Option<&BigRational>,
+    claimed: &Claimed<'_>,
     steps: usize,
+    stop: &dyn Fn() -> bool,
 ) -> Vec<VerifiedPart> {
     let open = |name: &str| fs::File::open(directory.join(name)).map(BufReader::new);
     let opened = STREAMED.map(open);
@@ -110,6 +114,6 @@ fn refuted(
         return vec![VerifiedPart { part: "formula", result: Err("it cannot be read".to_owned()) }];
     };
     let inputs = Inputs { formula: &mut formula, legend: &mut legend, proof: &mut proof, hints: &mut hints };
-    let checked = check_refutation(documents, metric, steps, inputs).into_iter();
+    let checked = claimed.check_refutation(steps, inputs, stop).into_iter();
     checked.map(|(part, result)| VerifiedPart { part, result }).collect()
 }

@@ -1,6 +1,6 @@
 //! Reads the PDDL files of a certificate and checks that its ground task is faithful to them.
 
-use certificate::{Faithful, faithful};
+use certificate::{Difference, Faithful, Fault, GroundTask, faithful_to};
 use pddl::Source;
 use pddl::ast::{Domain, Problem};
 
@@ -24,10 +24,11 @@ pub fn read_pddl(domain: &str, problem: &str) -> Result<(Domain, Problem), Strin
 pub fn same_task(
     domain: &Domain,
     problem: &Problem,
-    (task, witness): (&str, &str),
+    (task, witness): (&Result<GroundTask, Fault>, &str),
     stop: &dyn Fn() -> bool,
 ) -> Result<(String, bool), String> {
-    match faithful(domain, problem, task, witness, stop) {
+    let task = task.as_ref().map_err(|fault| Difference::from(fault).to_string())?;
+    match faithful_to(domain, problem, task, witness, stop) {
         Faithful::Yes { instances, idle, timed } => {
             let summary = format!(
                 "it represents the files: {instances} instances of actions can be executed, {idle} of which change \

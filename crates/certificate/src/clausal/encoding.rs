@@ -9,8 +9,14 @@ use crate::model::Model;
 
 /// Encodes that some plan of at most `steps` steps costs less than `cost`. Returns an error if the
 /// task has an unsupported construct, `cost` is not positive, or the formula exceeds `limit`
-/// literals.
-pub(super) fn encode(model: &Model, cost: &Integer, steps: usize, limit: usize) -> Result<Formula, String> {
+/// literals, or `stop` returns `true`.
+pub(super) fn encode(
+    model: &Model,
+    cost: &Integer,
+    steps: usize,
+    limit: usize,
+    stop: &dyn Fn() -> bool,
+) -> Result<Formula, String> {
     // The initial values of derived variables are not checked, even if no rule derives them.
     if !model.axioms.is_empty() || model.basic < model.variables.len() {
         return Err("derived predicates are not covered".into());
@@ -26,12 +32,18 @@ pub(super) fn encode(model: &Model, cost: &Integer, steps: usize, limit: usize) 
     let mut sums = Sums::new(model, &mut formula, cost, steps)?;
     formula.has_number(sums.widest());
     for step in 0..steps {
+        if stop() {
+            return Err("it was stopped before its end".into());
+        }
+        let before = formula.literals();
         timeline.advance(model, &mut formula, step);
         sums.advance(model, &mut formula, &timeline, step)?;
-        formula.within_limit()?;
+        // No later step has fewer literals than the first one.
+        let later = if step == 0 { steps.saturating_sub(1) } else { 0 };
+        formula.within_limit(formula.literals().saturating_sub(before).saturating_mul(later))?;
     }
     timeline.goal(model, &mut formula);
     sums.goal(model, &mut formula)?;
-    formula.within_limit()?;
+    formula.within_limit(0)?;
     Ok(formula)
 }

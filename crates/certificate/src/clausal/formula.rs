@@ -32,8 +32,13 @@ impl Formula {
         self.widest = self.widest.max(bits);
     }
 
-    pub(super) fn within_limit(&self) -> Result<(), String> {
-        if self.literals.len() > self.limit || self.names.len() >= self.limit {
+    pub(super) fn literals(&self) -> usize {
+        self.literals.len()
+    }
+
+    /// Returns an error if the formula exceeds its limit, or will exceed it with `further` literals.
+    pub(super) fn within_limit(&self, further: usize) -> Result<(), String> {
+        if self.literals.len().saturating_add(further) > self.limit || self.names.len() >= self.limit {
             return Err(format!("the formula has more than {} literals", self.limit));
         }
         Ok(())

@@ -25,13 +25,11 @@ use std::io::BufRead;
 
 use num_rational::BigRational;
 
-use crate::argument::Argument;
-use crate::check::{Fault, parse};
+use crate::check::{Claimed, Fault, GroundTask};
 use crate::integer::Integer;
-use crate::model::Model;
 pub use formula::Formula;
 pub use literal::Literal;
-pub use steps::StepBound;
+pub use steps::StepBounds;
 
 /// Upper limit on the number of literals of a formula, and on the number of its variables.
 const LITERAL_LIMIT: usize = 4_000_000;
@@ -49,61 +47,85 @@ pub struct Inputs<'i> {
     pub hints: &'i mut dyn BufRead,
 }
 
-/// Encodes "some plan of at most T steps is cheaper than the claim". T is chosen such that no plan of more than
-/// T steps is cheaper if the potentials are lower bounds, which is not checked. Returns the formula and T. The
-/// claim is interpreted as in [`crate::check`].
-///
-/// # Errors
-/// A malformed document, a missing claim, an unsupported construct, no provable bound on the number of steps,
-/// or an exceeded limit.
-pub fn formula(
-    (task, argument): (&str, &str),
-    claim: Option<&BigRational>,
-    by: StepBound,
-) -> Result<(Formula, usize), String> {
-    let (model, argument, cost) = parse(task, argument, claim).map_err(|fault| fault.to_string())?;
-    let cost = cost.ok_or("that there is no plan is not a matter of a number of steps")?;
-    let steps = steps::bound(&model, &argument, &cost, by)?;
-    Ok((encoding::encode(&model, &cost, steps, LITERAL_LIMIT)?, steps))
+impl Claimed<'_> {
+    /// Computes numbers T such that no plan of more than T steps is cheaper than the claim, if the potentials are lower
+    /// bounds, which is not checked. `stop` returns `true` to cancel the computation.
+    ///
+    /// # Errors
+    /// A missing claim, no bound on the number of steps, or a cancelled computation.
+    pub fn step_bounds(&self, stop: &dyn Fn() -> bool) -> Result<StepBounds, String> {
+        steps::bounds(self.model, &self.argument, self.claimed_cost()?, stop)
+    }
+
+    /// Encodes "some plan of at most `steps` steps is cheaper than the claim". `stop` returns `true` to cancel the
+    /// encoding.
+    ///
+    /// # Errors
+    /// A missing claim, an unsupported construct, an exceeded limit, or a cancelled encoding.
+    pub fn formula(&self, steps: usize, stop: &dyn Fn() -> bool) -> Result<Formula, String> {
+        encoding::encode(self.model, self.claimed_cost()?, steps, LITERAL_LIMIT, stop)
+    }
+
+    fn claimed_cost(&self) -> Result<&Integer, String> {
+        let reason = || "that there is no plan is not a matter of a number of steps".to_owned();
+        self.cost.as_ref().ok_or_else(reason)
+    }
+
+    /// Checks the three parts of a refutation: the formula encodes the task, the proof refutes the formula, and no
+    /// plan of more than `steps` steps is cheaper. Returns for each part its name with a summary, or with the
+    /// reason of failure. `stop` returns `true` to cancel the check.
+    pub fn check_refutation(
+        &self,
+        steps: usize,
+        Inputs { formula: written, legend, proof, hints }: Inputs<'_>,
+        stop: &dyn Fn() -> bool,
+    ) -> [(&'static str, Result<String, String>); 3] {
+        let Self { model, argument, cost } = self;
+        let Some(cost) = cost else {
+            let reason = Fault::Form { document: "the manifest", reason: "a formula without a cost".into() };
+            return failed(&reason);
+        };
+        let steps_checked = steps::check(model, argument, cost, steps, stop).map(|position| {
+            format!("no plan of more than {steps} steps is cheaper, by potential {position}")
+        });
+        let formula = encoding::encode(model, cost, steps, LITERAL_LIMIT, stop);
+        let (formula_checked, proof_checked) = match formula {
+            Ok(formula) => {
+                let comparison = formula.compare(written, legend).map(|()| {
+                    format!(
+                        "encoding of the task for {steps} steps: {} variables, {} clauses",
+                        formula.variables(),
+                        formula.count()
+                    )
+                });
+                let refuted = proof::check(formula.clauses(), formula.variables(), proof, hints)
+                    .map(|count| format!("it has no model: {count} clauses follow, the last is empty"));
+                (comparison, refuted)
+            }
+            Err(reason) => (Err(reason), Err("there is no formula to refute".to_owned())),
+        };
+        [("formula", formula_checked), ("proof", proof_checked), ("steps", steps_checked)]
+    }
 }
 
-/// Checks the three parts of a refutation: the formula encodes the task, the proof refutes the formula, and no
-/// plan of more than `steps` steps is cheaper. Returns for each part its name with a summary, or with the
-/// reason of failure.
+/// Names of the parts of a refutation, in the order of [`Claimed::check_refutation`].
+pub const REFUTATION_PARTS: [&str; 3] = ["formula", "proof", "steps"];
+
+fn failed(fault: &Fault) -> [(&'static str, Result<String, String>); 3] {
+    REFUTATION_PARTS.map(|part| (part, Err(fault.to_string())))
+}
+
+/// Checks the three parts of a refutation, see [`Claimed::check_refutation`].
 pub fn check_refutation(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,
     steps: usize,
-    Inputs { formula: written, legend, proof, hints }: Inputs<'_>,
+    inputs: Inputs<'_>,
 ) -> [(&'static str, Result<String, String>); 3] {
-    let prepared = parse(task, argument, claim).and_then(|(model, argument, cost)| {
-        let reason = || Fault::Form { document: "the manifest", reason: "a formula without a cost".into() };
-        Ok((model, argument, cost.ok_or_else(reason)?))
-    });
-    let (model, argument, cost): (Model, Argument, Integer) = match prepared {
-        Ok(prepared) => prepared,
-        Err(fault) => {
-            let failed = || Err(fault.to_string());
-            return [("formula", failed()), ("proof", failed()), ("steps", failed())];
-        }
-    };
-    let steps_checked = steps::check(&model, &argument, &cost, steps)
-        .map(|position| format!("no plan of more than {steps} steps is cheaper, by potential {position}"));
-    let formula = encoding::encode(&model, &cost, steps, LITERAL_LIMIT);
-    let (formula_checked, proof_checked) = match formula {
-        Ok(formula) => {
-            let comparison = formula.compare(written, legend).map(|()| {
-                format!(
-                    "encoding of the task for {steps} steps: {} variables, {} clauses",
-                    formula.variables(),
-                    formula.count()
-                )
-            });
-            let refuted = proof::check(formula.clauses(), formula.variables(), proof, hints)
-                .map(|count| format!("it has no model: {count} clauses follow, the last is empty"));
-            (comparison, refuted)
-        }
-        Err(reason) => (Err(reason), Err("there is no formula to refute".to_owned())),
-    };
-    [("formula", formula_checked), ("proof", proof_checked), ("steps", steps_checked)]
+    let task = GroundTask::read(task);
+    let claimed = task.as_ref().map_err(Clone::clone).and_then(|task| Claimed::read(task, argument, claim));
+    match claimed {
+        Ok(claimed) => claimed.check_refutation(steps, inputs, &|| false),
+        Err(fault) => failed(&fault),
+    }
 }

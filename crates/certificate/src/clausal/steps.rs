@@ -2,7 +2,7 @@
 //!
 //! The first T + 1 steps of a plan lead to some values of the variables of a potential (a table of lower bounds
 //! on the remaining cost). They cost at least as much as the cheapest sequence of T + 1 operators that leads to
-//! these values. The remaining steps cost at least the potential (or, for [`StepBound::Spent`], at least 0). If
+//! these values. The remaining steps cost at least the potential (or, for [`StepBounds::spent`], at least 0). If
 //! the sum is at least the claim for all values, a cheaper plan has at most T steps.
 
 use crate::argument::Argument;
@@ -10,15 +10,14 @@ use crate::integer::Integer;
 use crate::model::Model;
 use crate::table::{Table, check_potential};
 
-/// The lower bound on the cost of a plan with more than T steps, by which T is determined.
+/// Numbers T such that no plan of more than T steps is cheaper than the claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StepBound {
-    /// The cost of the first T + 1 steps alone. T then does not depend on the values of a potential
-    /// (table of lower bounds on the remaining cost).
-    Spent,
-    /// The cost of the first T + 1 steps plus the potential (lower bound on the remaining cost). T and the
-    /// formula are smaller than with [`StepBound::Spent`], or equal.
-    Potential,
+pub struct StepBounds {
+    /// The least T that follows from the cost of the first T + 1 steps alone. It does not depend on the values of a
+    /// potential (table of lower bounds on the remaining cost). `None` if it exceeds [`STEP_LIMIT`].
+    pub spent: Option<usize>,
+    /// The least T that follows from the cost of the first T + 1 steps plus the potential. At most `spent`.
+    pub potential: usize,
 }
 
 const STEP_LIMIT: usize = 64;
@@ -26,44 +25,61 @@ const STEP_LIMIT: usize = 64;
 /// transitions are not used.
 const EDGE_LIMIT: usize = 1 << 22;
 
-/// Returns the least T for which the lower bound `by`, with one of the potentials, implies that no plan of more
-/// than T steps costs less than `cost`. The potentials are not checked. Returns an error if there is no such T
-/// up to [`STEP_LIMIT`].
-pub(super) fn bound(
+/// Computes bounds on the number of steps from the potentials, which are not checked. Returns an error if there is no
+/// bound up to [`STEP_LIMIT`], or `stop` returns `true`.
+pub(super) fn bounds(
     model: &Model,
     argument: &Argument,
     cost: &Integer,
-    by: StepBound,
-) -> Result<usize, String> {
-    let bounds = argument.potentials.iter().filter_map(|potential| {
+    stop: &dyn Fn() -> bool,
+) -> Result<StepBounds, String> {
+    let is_enough = |least: Option<Integer>| least.is_none_or(|least| least >= *cost);
+    let stopped = || "the computation of the number of steps was stopped".to_owned();
+    let (mut spent, mut fewest): (Option<usize>, Option<usize>) = (None, None);
+    for potential in &argument.potentials {
         let table = Table::new(model, &potential.pattern, &potential.values);
-        let mut layers = Layers::new(model, &table)?;
-        (0..=STEP_LIMIT).find(|_| {
+        let Some(mut layers) = Layers::new(model, &table, stop) else { continue };
+        let mut is_found = false;
+        // Only a lower number than that of the potentials before matters.
+        for steps in 0..spent.unwrap_or(STEP_LIMIT.saturating_add(1)) {
+            if stop() {
+                return Err(stopped());
+            }
             layers.advance();
-            let least = if by == StepBound::Spent { layers.spent() } else { layers.least() };
-            least.is_none_or(|least| least >= *cost)
-        })
-    });
-    bounds.min().ok_or_else(|| format!("a cheaper plan may have more than {STEP_LIMIT} steps"))
+            if !is_found && is_enough(layers.least()) {
+                is_found = true;
+                fewest = Some(fewest.map_or(steps, |fewest| fewest.min(steps)));
+            }
+            if is_enough(layers.spent()) {
+                spent = Some(steps);
+                break;
+            }
+        }
+    }
+    if stop() {
+        return Err(stopped());
+    }
+    let potential = fewest.ok_or_else(|| format!("a cheaper plan may have more than {STEP_LIMIT} steps"))?;
+    Ok(StepBounds { spent, potential })
 }
 
-/// Checks by [`StepBound::Potential`] that no plan of more than `steps` steps costs less than
-/// `cost`. Returns the position of a potential that proves it. The potential is checked, too.
+/// Checks that no plan of more than `steps` steps costs less than `cost`, as for [`StepBounds::potential`]. Returns the position of a potential that proves it. The potential is checked, too.
 pub(super) fn check(
     model: &Model,
     argument: &Argument,
     cost: &Integer,
     steps: usize,
+    stop: &dyn Fn() -> bool,
 ) -> Result<usize, String> {
     if steps > STEP_LIMIT {
         return Err(format!("more than {STEP_LIMIT} steps"));
     }
     let serves = |(position, potential): (usize, &crate::argument::Potential)| {
         let table = Table::new(model, &potential.pattern, &potential.values);
-        let mut layers = Layers::new(model, &table)?;
+        let mut layers = Layers::new(model, &table, stop)?;
         (0..=steps).for_each(|_| layers.advance());
         let is_enough = layers.least().is_none_or(|least| least >= *cost);
-        (is_enough && check_potential(model, &table).is_ok()).then_some(position)
+        (is_enough && check_potential(model, &table, stop).is_ok()).then_some(position)
     };
     let position = argument.potentials.iter().enumerate().find_map(serves);
     position.ok_or_else(|| format!("a cheaper plan may have more than {steps} steps"))
@@ -79,7 +95,8 @@ struct Layers<'l> {
 }
 
 impl<'l> Layers<'l> {
-    fn new(model: &Model, table: &'l Table<'l>) -> Option<Self> {
+    /// Returns `None` if there are too many transitions, or `stop` returns `true`.
+    fn new(model: &Model, table: &'l Table<'l>, stop: &dyn Fn() -> bool) -> Option<Self> {
         let mut edges = Vec::new();
         let mut idle: Option<Integer> = None;
         for operator in &model.operators {
@@ -88,6 +105,9 @@ impl<'l> Layers<'l> {
             if !table.touches(operator) {
                 idle = Some(idle.map_or(cost.clone(), |cheapest| cheapest.min(cost)));
                 continue;
+            }
+            if stop() {
+                return None;
             }
             for values in table.matching(&operator.condition.facts) {
                 let targets = table.targets(operator, &values);

@@ -55,9 +55,8 @@ use std::collections::BTreeSet;
 use num_rational::BigRational;
 use num_traits::Zero;
 
+use crate::check::GroundTask;
 use crate::model::Model;
-use crate::model::TASK_FORMAT;
-use crate::references;
 use axioms::Axioms;
 use case::Case;
 use compare::Comparison;
@@ -84,20 +83,28 @@ pub fn faithful(
     witness: &str,
     stop: &dyn Fn() -> bool,
 ) -> Faithful {
-    let outcome = read(task).and_then(|model| {
-        let files = Files::new(domain, problem, &model, stop)?;
-        files.compare(witness)
-    });
-    match outcome {
-        Ok(verdict) => verdict,
+    match read(task) {
+        Ok(task) => faithful_to(domain, problem, &task, witness, stop),
         Err(obstacle) => verdict(obstacle),
     }
+}
+
+/// Checks that a ground task is faithful to its PDDL files, see [`faithful()`].
+pub fn faithful_to(
+    domain: &Domain,
+    problem: &Problem,
+    task: &GroundTask,
+    witness: &str,
+    stop: &dyn Fn() -> bool,
+) -> Faithful {
+    let files = Files::new(domain, problem, &task.model, stop);
+    files.and_then(|files| files.compare(witness)).unwrap_or_else(verdict)
 }
 
 /// Computes the witness (an over-approximation of the reachable states) for a ground task, as JSON.
 ///
 /// # Errors
-/// A verdict as of [`faithful`]: the task is malformed, a construct is not supported, a limit on sizes is
+/// A verdict as of [`faithful()`]: the task is malformed, a construct is not supported, a limit on sizes is
 /// exceeded, or the computation was stopped.
 pub fn witness(
     domain: &Domain,
@@ -105,8 +112,27 @@ pub fn witness(
     task: &str,
     stop: &dyn Fn() -> bool,
 ) -> std::result::Result<String, Faithful> {
-    let witness = read(task).and_then(|model| Files::new(domain, problem, &model, stop)?.witness());
+    let witness = read(task).and_then(|task| Files::new(domain, problem, &task.model, stop)?.witness());
     witness.map_err(verdict)
+}
+
+/// Computes the witness of a ground task as [`witness()`] does, and checks with it that the task is faithful to its
+/// PDDL files. The check reads the witness from its JSON.
+///
+/// # Errors
+/// The verdict of [`witness()`] or of [`faithful()`], if it is not [`Faithful::Yes`].
+pub fn witnessed(
+    domain: &Domain,
+    problem: &Problem,
+    task: &GroundTask,
+    stop: &dyn Fn() -> bool,
+) -> std::result::Result<String, Faithful> {
+    let files = Files::new(domain, problem, &task.model, stop).map_err(verdict)?;
+    let witness = files.witness().map_err(verdict)?;
+    match files.compare(&witness).unwrap_or_else(verdict) {
+        Faithful::Yes { .. } => Ok(witness),
+        other => Err(other),
+    }
 }
 
 fn verdict(obstacle: Obstacle) -> Faithful {
@@ -116,14 +142,8 @@ fn verdict(obstacle: Obstacle) -> Faithful {
     }
 }
 
-fn read(task: &str) -> Result<Model> {
-    let form = |reason: String| Obstacle::Differs(Difference::Form { reason });
-    let model: Model = serde_json::from_str(task).map_err(|error| form(error.to_string()))?;
-    if model.format != TASK_FORMAT {
-        return Err(form(format!("format `{}`, where `{TASK_FORMAT}` is expected", model.format)));
-    }
-    references::task(&model).map_err(form)?;
-    Ok(model)
+fn read(task: &str) -> Result<GroundTask> {
+    Ok(GroundTask::read(task).map_err(|fault| Difference::from(&fault))?)
 }
 
 struct Instance {

@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::check::Fault;
+
 /// Outcome of checking a ground task against its PDDL files.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Faithful {
@@ -96,6 +98,16 @@ pub enum Difference {
         /// Description of the error.
         reason: String,
     },
+}
+
+impl From<&Fault> for Difference {
+    fn from(fault: &Fault) -> Self {
+        let reason = match fault {
+            Fault::Form { reason, .. } => reason.clone(),
+            other => other.to_string(),
+        };
+        Self::Form { reason }
+    }
 }
 
 /// The reason why the check cannot decide.

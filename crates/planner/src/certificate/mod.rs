@@ -15,5 +15,5 @@ mod trim;
 mod write;
 
 pub use no_certificate::NoCertificate;
-pub use refute::{Outputs, refute};
+pub use refute::{Attempt, Outputs, attempts, refute};
 pub use write::{Certificate, certify, certify_exact};

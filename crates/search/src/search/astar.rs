@@ -390,6 +390,11 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.incumbent_is_external && self.limit == self.bound
     }
 
+    /// Returns `true` if no state was dropped because a number overflowed.
+    pub(super) fn is_complete(&self) -> bool {
+        !self.states_dropped
+    }
+
     pub(super) fn is_interrupted(&self) -> bool {
         self.is_interrupted
     }

@@ -367,6 +367,8 @@ pub enum NoLabels {
 /// `cost`, which must not exceed the cost of an optimal plan. If `cost` is `None`, there must be no plan, and
 /// all closed states are returned.
 ///
+/// The search ends at the first state whose f value is `cost`: the states on this plateau are no labels.
+///
 /// # Errors
 /// Fails if a condition on `cost` does not hold, or if the search ends without a proof, see [`NoLabels`].
 pub fn closed_labels<N: TaskNumber>(
@@ -379,10 +381,17 @@ pub fn closed_labels<N: TaskNumber>(
     let task = context.task;
     let space = SearchProblem { context, bounds, prepared: &prepared, orbits: None };
     let polarities = uniform_directions(task);
-    let mut search = AStar::with_polarities(&space, &task.initial, OpenListOrder::Fewest, None, polarities);
+    let mut search = AStar::with_polarities(&space, &task.initial, OpenListOrder::Nearest, None, polarities);
+    if let Some(cost) = cost {
+        search.set_upper_bound(cost.clone());
+        // With this bound, the search would forecast its memory, and could give up.
+        search.patience = OutOfMemoryPolicy::Some;
+    }
     match (search.run_until_states(STATE_LIMIT, &mut |_, _| {}), cost) {
         (Some(SearchOutcome::Optimal(plan)), Some(cost)) if plan.cost >= *cost => {}
-        (Some(SearchOutcome::None), None) => {}
+        (Some(SearchOutcome::None), _) => {}
+        (Some(SearchOutcome::Unknown(None)), Some(_))
+            if search.proves_upper_bound() && search.is_complete() => {}
         (None, _) if search.store.len() > STATE_LIMIT => return Err(NoLabels::States),
         (None, _) => return Err(NoLabels::Limit),
         _ if search.is_interrupted() => return Err(NoLabels::Limit),
