@@ -10,8 +10,8 @@ Import ListNotations.
 Open Scope nat_scope.
 
 (* Values of XSD. Numbers are decimals and integers, in lowest terms, so that equal values are the same term. *)
-Inductive value := Text (characters : list Z) | Boolean (b : bool) | Number (q : Q).
-Inductive symbol := Name (n : key) | Literal (x : value).
+Inductive xsd_value := Text (characters : list Z) | Boolean (b : bool) | Numeric (q : Q).
+Inductive symbol := Name (n : key) | Literal (x : xsd_value).
 Definition is_name (s : symbol) : bool := match s with Name _ => true | Literal _ => false end.
 Definition data := (key * list symbol)%type.       (* a fact: a class, property or relation, with its arguments *)
 
@@ -27,17 +27,17 @@ Fixpoint compare_text (s t : list Z) : comparison :=
   | [], [] => Eq | [], _ :: _ => Lt | _ :: _, [] => Gt
   | c :: s, d :: t => match Z.compare c d with Eq => compare_text s t | o => o end
   end.
-Definition compare_values (x y : value) : option comparison :=
+Definition compare_values (x y : xsd_value) : option comparison :=
   match x, y with
   | Text s, Text t => Some (compare_text s t)
   | Boolean b, Boolean c => Some (if b then if c then Eq else Gt else if c then Lt else Eq)
-  | Number p, Number q => Some (Qcompare p q)
+  | Numeric p, Numeric q => Some (Qcompare p q)
   | _, _ => None                                   (* values of different kinds have no order *)
   end.
-Definition in_datatype (x : value) (d : datatype) : bool :=
+Definition in_datatype (x : xsd_value) (d : datatype) : bool :=
   match x, d with
-  | Text _, AnyText => true | Boolean _, AnyBoolean => true | Number _, AnyNumber => true
-  | Number q, AnyInteger => Pos.eqb (Qden q) 1
+  | Text _, AnyText => true | Boolean _, AnyBoolean => true | Numeric _, AnyNumber => true
+  | Numeric q, AnyInteger => Pos.eqb (Qden q) 1
   | _, _ => false
   end.
 Definition satisfies (test : built_in) (a b : symbol) : bool :=

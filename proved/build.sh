@@ -11,15 +11,16 @@ for theorem in Sound.sound Derived.derive_closed Axioms.stratum_closed Optimal.o
   echo "$theorem: closed under the global context"
 done
 cd ocaml
-ocamlfind ocamlopt -c checker.mli checker.ml reader.ml evidence.ml timed.ml exhaustive.ml
-for program in check check_list check_front prepare mutants differential semantics; do
+ocamlfind ocamlopt -c checker.mli checker.ml reader.ml json.ml evidence.ml timed.ml exhaustive.ml knowledge.ml
+for program in check check_list check_front check_knowledge prepare mutants knowledge_mutants differential semantics; do
   # `metaplan verify --proved` finds its programs by these names, also in PATH.
   case $program in
     check | prepare) name=metaplan-proved-$program ;;
     check_front) name=metaplan-proved-front ;;
+    check_knowledge) name=metaplan-proved-knowledge ;;
     *) name=$program ;;
   esac
   # The search is for tests only.
   case $program in mutants | differential) search=exhaustive.cmx ;; *) search= ;; esac
-  ocamlfind ocamlopt checker.cmx reader.cmx evidence.cmx timed.cmx $search "$program.ml" -o "$name"
+  ocamlfind ocamlopt checker.cmx reader.cmx json.cmx evidence.cmx timed.cmx knowledge.cmx $search "$program.ml" -o "$name"
 done

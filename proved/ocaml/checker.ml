@@ -4885,14 +4885,14 @@ let check_timed p events t0 n x case wait_case goal_case a oracle plan claim =
         | Some _ -> false
         | None -> check t0 a None oracle))
 
-type value0 =
+type xsd_value =
 | Text of z list
 | Boolean of bool
-| Number0 of q
+| Numeric of q
 
 type symbol =
 | Name of key1
-| Literal of value0
+| Literal of xsd_value
 
 (** val is_name : symbol -> bool **)
 
@@ -5004,9 +5004,9 @@ let symbol_eq_dec a b =
              then if b1 then true else false
              else if b1 then false else true
            | _ -> false)
-        | Number0 q0 ->
+        | Numeric q0 ->
           (match x0 with
-           | Number0 q1 ->
+           | Numeric q1 ->
              let { qnum = qnum0; qden = qden0 } = q0 in
              let { qnum = qnum1; qden = qden1 } = q1 in
              if match qnum0 with
@@ -5083,7 +5083,7 @@ let rec compare_text s t0 =
                    | Eq -> compare_text s0 t1
                    | x -> x))
 
-(** val compare_values : value0 -> value0 -> comparison option **)
+(** val compare_values : xsd_value -> xsd_value -> comparison option **)
 
 let compare_values x y =
   match x with
@@ -5095,11 +5095,11 @@ let compare_values x y =
      | Boolean c ->
        Some (if b then if c then Eq else Gt else if c then Lt else Eq)
      | _ -> None)
-  | Number0 p -> (match y with
-                  | Number0 q0 -> Some (qcompare p q0)
+  | Numeric p -> (match y with
+                  | Numeric q0 -> Some (qcompare p q0)
                   | _ -> None)
 
-(** val in_datatype : value0 -> datatype -> bool **)
+(** val in_datatype : xsd_value -> datatype -> bool **)
 
 let in_datatype x d =
   match x with
@@ -5109,7 +5109,7 @@ let in_datatype x d =
   | Boolean _ -> (match d with
                   | AnyBoolean -> true
                   | _ -> false)
-  | Number0 q0 ->
+  | Numeric q0 ->
     (match d with
      | AnyNumber -> true
      | AnyInteger -> Coq_Pos.eqb q0.qden XH

@@ -1311,14 +1311,14 @@ val check_timed :
   passage -> case_tree) -> (nat -> case_tree) -> case_tree -> argument ->
   (state -> positive list) -> (q * (nat * key1 list)) list -> q option -> bool
 
-type value0 =
+type xsd_value =
 | Text of z list
 | Boolean of bool
-| Number0 of q
+| Numeric of q
 
 type symbol =
 | Name of key1
-| Literal of value0
+| Literal of xsd_value
 
 val is_name : symbol -> bool
 
@@ -1344,9 +1344,9 @@ val symbol_eqb : symbol -> symbol -> bool
 
 val compare_text : z list -> z list -> comparison
 
-val compare_values : value0 -> value0 -> comparison option
+val compare_values : xsd_value -> xsd_value -> comparison option
 
-val in_datatype : value0 -> datatype -> bool
+val in_datatype : xsd_value -> datatype -> bool
 
 val satisfies : built_in -> symbol -> symbol -> bool
 
