@@ -238,6 +238,16 @@ let at_most_listed = 16                     (* larger sets of disjoint classes a
 
 let document text =
   let triples = List.filter_map Fun.id (List.mapi (fun i line -> triple (i + 1) line) (String.split_on_char '\n' text)) in
+  (* Blank nodes are numbered by their first occurrence, as in the derivations. *)
+  let labels = Hashtbl.create 50 in
+  let numbered = function
+    | Blank label ->
+      if not (Hashtbl.mem labels label) then Hashtbl.add labels label (Printf.sprintf "d0b%d" (Hashtbl.length labels));
+      Blank (Hashtbl.find labels label)
+    | node -> node in
+  let triples = List.map (fun (subject, predicate, value) ->
+    let subject = numbered subject in
+    subject, predicate, numbered value) triples in
   let triples = List.sort_uniq compare triples in
   let by_subject = Hashtbl.create 1000 in
   List.iter (fun (subject, predicate, value) -> Hashtbl.add by_subject subject (predicate, value)) triples;
@@ -254,7 +264,18 @@ let document text =
     | [kind] -> plain iri, local owl kind
     | _ -> reject "not covered: <%s>, which is not declared as a property of one kind" iri in
   let only_iri = function Iri iri -> iri | node -> reject "not covered: %s instead of a name" (show node) in
-  let class_node node = class_of (only_iri node) and name_node node = plain (only_iri node) in
+  (* A blank node without structure is an anonymous individual. *)
+  let is_individual = function
+    | Iri _ -> true
+    | Blank _ as node ->
+      List.for_all (function
+        | predicate, Iri kind when predicate = rdf ^ "type" -> not (is_reserved kind)
+        | predicate, _ -> not (is_reserved predicate) || List.mem predicate annotations) (Hashtbl.find_all by_subject node)
+    | _ -> false in
+  let class_node node = class_of (only_iri node) in
+  let name_node = function
+    | Blank label as node when is_individual node -> name_key ("urn:metaplan:anonymous:" ^ label)
+    | node -> plain (only_iri node) in
 
   let x = C.RuleVariable (variable "x") and y = C.RuleVariable (variable "y") and z = C.RuleVariable (variable "z") in
   let facts = ref [] and rules = ref [] in
@@ -343,7 +364,8 @@ let document text =
     | _ when kind = swrl ^ "Imp" -> swrl_rule subject
     | _ when kind = swrl ^ "Variable" -> ()
     | _ -> state (class_of kind) [C.Name (name_node subject)] in
-  let top = function Iri _ -> true | node -> List.exists (fun kind -> kind = owl ^ "AllDisjointClasses" || kind = swrl ^ "Imp") (types node) in
+  let top node =
+    is_individual node || List.exists (fun kind -> kind = owl ^ "AllDisjointClasses" || kind = swrl ^ "Imp") (types node) in
   List.iter (fun (subject, predicate, value) ->
     if top subject then
       let is_rule = List.mem (swrl ^ "Imp") (types subject) and is_set = List.mem (owl ^ "AllDisjointClasses") (types subject) in
@@ -375,7 +397,7 @@ let document text =
         let p, kind = property predicate in
         (match kind, value with
          | "AnnotationProperty", _ -> ()
-         | "ObjectProperty", Iri iri -> state p [C.Name (name_node subject); C.Name (plain iri)]
+         | "ObjectProperty", (Iri _ | Blank _) -> state p [C.Name (name_node subject); C.Name (name_node value)]
          | "DatatypeProperty", Value value -> state p [C.Name (name_node subject); C.Literal value]
          | _ -> reject "not covered: the value %s of <%s>" (show value) predicate)) triples;
   List.iter (fun (subject, predicate, _) ->
