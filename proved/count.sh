@@ -56,5 +56,12 @@ row 'theorem `timed_optimal` in `proved/TimelineProof.v`' <<EOF
 $(sed -n '/^Theorem timed_optimal/,/^Proof/p' TimelineProof.v | grep -v '^Proof')
 EOF
 row '`proved/ocaml/timed.ml`' <ocaml/timed.ml
+row '`proved/Datalog.v`' <Datalog.v
+row 'theorem `knowledge` in `proved/Derivations.v`' <<EOF
+$(sed -n '/^Theorem knowledge/,/^Proof/p' Derivations.v | grep -v '^Proof')
+EOF
+row '`proved/ocaml/json.ml`' <ocaml/json.ml
+row '`proved/ocaml/knowledge.ml`' <ocaml/knowledge.ml
+row '`proved/ocaml/check_knowledge.ml`' <ocaml/check_knowledge.ml
 total=$believed
 [ "$total" -le "$limit" ] || { echo "more than $limit lines have to be believed" >&2; exit 1; }

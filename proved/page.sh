@@ -9,11 +9,11 @@ cd "$(dirname "$0")"
 limit=300000
 temporary=$(mktemp -d)
 trap 'rm -rf "$temporary"' EXIT
-cp ocaml/checker.mli ocaml/checker.ml ocaml/reader.ml ocaml/evidence.ml ocaml/timed.ml ocaml/prepare.ml ocaml/check.ml page/verify.html "$temporary"
+cp ocaml/checker.mli ocaml/checker.ml ocaml/reader.ml ocaml/json.ml ocaml/evidence.ml ocaml/timed.ml ocaml/prepare.ml ocaml/check.ml page/verify.html "$temporary"
 cd "$temporary"
-ocamlfind ocamlc -c checker.mli checker.ml reader.ml evidence.ml timed.ml
+ocamlfind ocamlc -c checker.mli checker.ml reader.ml json.ml evidence.ml timed.ml
 for program in prepare check; do
-  ocamlfind ocamlc checker.cmo reader.cmo evidence.cmo timed.cmo "$program.ml" -o "$program.byte"
+  ocamlfind ocamlc checker.cmo reader.cmo json.cmo evidence.cmo timed.cmo "$program.ml" -o "$program.byte"
   js_of_ocaml "$program.byte" -o "$program.js"
   gzip -9 -n -c "$program.js" | base64 -w 0 >"$program.txt"
   echo >>"$program.txt"

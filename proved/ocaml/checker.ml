@@ -116,6 +116,11 @@ module Nat =
     | S n' -> (match m with
                | O -> false
                | S m' -> leb n' m')
+
+  (** val ltb : nat -> nat -> bool **)
+
+  let ltb n m =
+    leb (S n) m
  end
 
 module Pos =
@@ -576,6 +581,12 @@ let zeq_bool x y =
   | Eq -> true
   | _ -> false
 
+(** val in_dec : ('a1 -> 'a1 -> bool) -> 'a1 -> 'a1 list -> bool **)
+
+let rec in_dec h a = function
+| [] -> false
+| y :: l0 -> let s = h y a in if s then true else in_dec h a l0
+
 (** val nth : nat -> 'a1 list -> 'a1 -> 'a1 **)
 
 let rec nth n l default0 =
@@ -692,6 +703,12 @@ let rec skipn n l =
              | [] -> []
              | _ :: l0 -> skipn n0 l0)
 
+(** val nodup : ('a1 -> 'a1 -> bool) -> 'a1 list -> 'a1 list **)
+
+let rec nodup decA = function
+| [] -> []
+| x :: xs -> if in_dec decA x xs then nodup decA xs else x :: (nodup decA xs)
+
 (** val seq : nat -> nat -> nat list **)
 
 let rec seq start = function
@@ -704,6 +721,11 @@ type q = { qnum : z; qden : positive }
 
 let inject_Z x =
   { qnum = x; qden = XH }
+
+(** val qcompare : q -> q -> comparison **)
+
+let qcompare p q0 =
+  Z.compare (Z.mul p.qnum (Zpos q0.qden)) (Z.mul q0.qnum (Zpos p.qden))
 
 (** val qeq_bool : q -> q -> bool **)
 
@@ -1836,15 +1858,15 @@ let check t0 a claim oracle =
       (let fronts =
          map (fun o -> (o, (undominated_choices mono o))) t0.operators
        in
-       let index =
+       let index0 =
          index_fronts
            (frequencies
              (flat_map (fun o -> o.precondition.facts) t0.operators)) fronts
        in
-       let by_fact = M.elements (snd index) in
+       let by_fact = M.elements (snd index0) in
        forallb (fun il ->
          check_label t0 a claim oracle mono bs
-           (applicable (fst index) by_fact) (snd il)) (M.elements a.labels))
+           (applicable (fst index0) by_fact) (snd il)) (M.elements a.labels))
   | None ->
     if existsb (fun c -> match c with
                          | [] -> true
@@ -1863,16 +1885,16 @@ let check t0 a claim oracle =
            (let fronts =
               map (fun o -> (o, (undominated_choices mono o))) t0.operators
             in
-            let index =
+            let index0 =
               index_fronts
                 (frequencies
                   (flat_map (fun o -> o.precondition.facts) t0.operators))
                 fronts
             in
-            let by_fact = M.elements (snd index) in
+            let by_fact = M.elements (snd index0) in
             forallb (fun il ->
               check_label t0 a claim oracle mono bs
-                (applicable (fst index) by_fact) (snd il))
+                (applicable (fst index0) by_fact) (snd il))
               (M.elements a.labels))
 
 type key1 = positive
@@ -2433,17 +2455,17 @@ let excluded_by n k a =
 (** val possible : task -> names -> knowledge -> key1 -> z list **)
 
 let possible t0 n k v =
-  let known = in_variable n k v in
+  let known0 = in_variable n k v in
   let atoms = match M.find v n.variables with
               | Some vals -> vals
               | None -> []
   in
   filter (fun y ->
-    (&&) (forallb (fun xb -> eqb (Z.eqb y (fst xb)) (snd xb)) known)
+    (&&) (forallb (fun xb -> eqb (Z.eqb y (fst xb)) (snd xb)) known0)
       (negb
         (existsb (fun xa ->
           (&&) (Z.eqb y (fst xa)) (excluded_by n k (snd xa))) atoms)))
-    (match find snd known with
+    (match find snd known0 with
      | Some p -> let (x, _) = p in x :: []
      | None -> range (get t0.domain_size v))
 
@@ -4862,3 +4884,627 @@ let check_timed p events t0 n x case wait_case goal_case a oracle plan claim =
        (match claim with
         | Some _ -> false
         | None -> check t0 a None oracle))
+
+type xsd_value =
+| Text of z list
+| Boolean of bool
+| Numeric of q
+
+type symbol =
+| Name of key1
+| Literal of xsd_value
+
+(** val is_name : symbol -> bool **)
+
+let is_name = function
+| Name _ -> true
+| Literal _ -> false
+
+type data = key1 * symbol list
+
+type datatype =
+| AnyText
+| AnyBoolean
+| AnyNumber
+| AnyInteger
+
+type built_in =
+| Less
+| LessOrEqual
+| Identical
+| NotIdentical
+| Different
+| Outside of datatype
+
+(** val symbol_eq_dec : symbol -> symbol -> bool **)
+
+let symbol_eq_dec a b =
+  match a with
+  | Name n ->
+    (match b with
+     | Name n0 ->
+       let rec f p x =
+         match p with
+         | XI p0 -> (match x with
+                     | XI p1 -> f p0 p1
+                     | _ -> false)
+         | XO p0 -> (match x with
+                     | XO p1 -> f p0 p1
+                     | _ -> false)
+         | XH -> (match x with
+                  | XH -> true
+                  | _ -> false)
+       in f n n0
+     | Literal _ -> false)
+  | Literal x ->
+    (match b with
+     | Name _ -> false
+     | Literal x0 ->
+       (match x with
+        | Text characters ->
+          (match x0 with
+           | Text characters0 ->
+             let rec f l x1 =
+               match l with
+               | [] -> (match x1 with
+                        | [] -> true
+                        | _ :: _ -> false)
+               | y :: l0 ->
+                 (match x1 with
+                  | [] -> false
+                  | a0 :: l1 ->
+                    if match y with
+                       | Z0 -> (match a0 with
+                                | Z0 -> true
+                                | _ -> false)
+                       | Zpos p ->
+                         (match a0 with
+                          | Zpos p0 ->
+                            let rec f0 p1 x2 =
+                              match p1 with
+                              | XI p2 ->
+                                (match x2 with
+                                 | XI p3 -> f0 p2 p3
+                                 | _ -> false)
+                              | XO p2 ->
+                                (match x2 with
+                                 | XO p3 -> f0 p2 p3
+                                 | _ -> false)
+                              | XH -> (match x2 with
+                                       | XH -> true
+                                       | _ -> false)
+                            in f0 p p0
+                          | _ -> false)
+                       | Zneg p ->
+                         (match a0 with
+                          | Zneg p0 ->
+                            let rec f0 p1 x2 =
+                              match p1 with
+                              | XI p2 ->
+                                (match x2 with
+                                 | XI p3 -> f0 p2 p3
+                                 | _ -> false)
+                              | XO p2 ->
+                                (match x2 with
+                                 | XO p3 -> f0 p2 p3
+                                 | _ -> false)
+                              | XH -> (match x2 with
+                                       | XH -> true
+                                       | _ -> false)
+                            in f0 p p0
+                          | _ -> false)
+                    then f l0 l1
+                    else false)
+             in f characters characters0
+           | _ -> false)
+        | Boolean b0 ->
+          (match x0 with
+           | Boolean b1 ->
+             if b0
+             then if b1 then true else false
+             else if b1 then false else true
+           | _ -> false)
+        | Numeric q0 ->
+          (match x0 with
+           | Numeric q1 ->
+             let { qnum = qnum0; qden = qden0 } = q0 in
+             let { qnum = qnum1; qden = qden1 } = q1 in
+             if match qnum0 with
+                | Z0 -> (match qnum1 with
+                         | Z0 -> true
+                         | _ -> false)
+                | Zpos p ->
+                  (match qnum1 with
+                   | Zpos p0 ->
+                     let rec f p1 x1 =
+                       match p1 with
+                       | XI p2 ->
+                         (match x1 with
+                          | XI p3 -> f p2 p3
+                          | _ -> false)
+                       | XO p2 ->
+                         (match x1 with
+                          | XO p3 -> f p2 p3
+                          | _ -> false)
+                       | XH -> (match x1 with
+                                | XH -> true
+                                | _ -> false)
+                     in f p p0
+                   | _ -> false)
+                | Zneg p ->
+                  (match qnum1 with
+                   | Zneg p0 ->
+                     let rec f p1 x1 =
+                       match p1 with
+                       | XI p2 ->
+                         (match x1 with
+                          | XI p3 -> f p2 p3
+                          | _ -> false)
+                       | XO p2 ->
+                         (match x1 with
+                          | XO p3 -> f p2 p3
+                          | _ -> false)
+                       | XH -> (match x1 with
+                                | XH -> true
+                                | _ -> false)
+                     in f p p0
+                   | _ -> false)
+             then let rec f p x1 =
+                    match p with
+                    | XI p0 -> (match x1 with
+                                | XI p1 -> f p0 p1
+                                | _ -> false)
+                    | XO p0 -> (match x1 with
+                                | XO p1 -> f p0 p1
+                                | _ -> false)
+                    | XH -> (match x1 with
+                             | XH -> true
+                             | _ -> false)
+                  in f qden0 qden1
+             else false
+           | _ -> false)))
+
+(** val symbol_eqb : symbol -> symbol -> bool **)
+
+let symbol_eqb a b =
+  if symbol_eq_dec a b then true else false
+
+(** val compare_text : z list -> z list -> comparison **)
+
+let rec compare_text s t0 =
+  match s with
+  | [] -> (match t0 with
+           | [] -> Eq
+           | _ :: _ -> Lt)
+  | c :: s0 ->
+    (match t0 with
+     | [] -> Gt
+     | d :: t1 -> (match Z.compare c d with
+                   | Eq -> compare_text s0 t1
+                   | x -> x))
+
+(** val compare_values : xsd_value -> xsd_value -> comparison option **)
+
+let compare_values x y =
+  match x with
+  | Text s -> (match y with
+               | Text t0 -> Some (compare_text s t0)
+               | _ -> None)
+  | Boolean b ->
+    (match y with
+     | Boolean c ->
+       Some (if b then if c then Eq else Gt else if c then Lt else Eq)
+     | _ -> None)
+  | Numeric p -> (match y with
+                  | Numeric q0 -> Some (qcompare p q0)
+                  | _ -> None)
+
+(** val in_datatype : xsd_value -> datatype -> bool **)
+
+let in_datatype x d =
+  match x with
+  | Text _ -> (match d with
+               | AnyText -> true
+               | _ -> false)
+  | Boolean _ -> (match d with
+                  | AnyBoolean -> true
+                  | _ -> false)
+  | Numeric q0 ->
+    (match d with
+     | AnyNumber -> true
+     | AnyInteger -> Coq_Pos.eqb q0.qden XH
+     | _ -> false)
+
+(** val satisfies : built_in -> symbol -> symbol -> bool **)
+
+let satisfies test a b =
+  match test with
+  | Less ->
+    (match a with
+     | Name _ -> false
+     | Literal x ->
+       (match b with
+        | Name _ -> false
+        | Literal y ->
+          (match compare_values x y with
+           | Some c -> (match c with
+                        | Lt -> true
+                        | _ -> false)
+           | None -> false)))
+  | LessOrEqual ->
+    (match a with
+     | Name _ -> false
+     | Literal x ->
+       (match b with
+        | Name _ -> false
+        | Literal y ->
+          (match compare_values x y with
+           | Some c -> (match c with
+                        | Gt -> false
+                        | _ -> true)
+           | None -> false)))
+  | Identical ->
+    (match a with
+     | Name _ -> false
+     | Literal _ ->
+       (match b with
+        | Name _ -> false
+        | Literal _ -> symbol_eqb a b))
+  | NotIdentical ->
+    (match a with
+     | Name _ -> false
+     | Literal _ ->
+       (match b with
+        | Name _ -> false
+        | Literal _ -> negb (symbol_eqb a b)))
+  | Different ->
+    (match a with
+     | Name _ ->
+       (match b with
+        | Name _ -> false
+        | Literal _ -> negb (symbol_eqb a b))
+     | Literal _ -> negb (symbol_eqb a b))
+  | Outside d ->
+    (match a with
+     | Name _ -> false
+     | Literal x -> negb (in_datatype x d))
+
+type argument0 =
+| RuleVariable of key1
+| Symbol of symbol
+
+type pattern0 = key1 * argument0 list
+
+type conjunct =
+| Present of pattern0
+| Absent of pattern0
+| Test of built_in * argument0 * argument0
+| Count of nat * key1 list * pattern0 list
+
+type conclusion =
+| Concludes of pattern0
+| Equates of argument0 * argument0
+
+type implication = { premises : conjunct list; conclusions : conclusion list }
+
+type knowledge_base = { stated : data list; implications : implication list;
+                        same_as : key1 }
+
+(** val arguments_eqb : symbol list -> symbol list -> bool **)
+
+let arguments_eqb l m =
+  if list_eq_dec symbol_eq_dec l m then true else false
+
+(** val data_eqb : data -> data -> bool **)
+
+let data_eqb f g =
+  (&&) (Coq_Pos.eqb (fst f) (fst g)) (arguments_eqb (snd f) (snd g))
+
+type index = symbol list list M.t
+
+(** val rows : index -> key1 -> symbol list list **)
+
+let rows i p =
+  match M.find p i with
+  | Some l -> l
+  | None -> []
+
+(** val insert : index -> data -> index **)
+
+let insert i f =
+  M.add (fst f) ((snd f) :: (rows i (fst f))) i
+
+(** val index_of : data list -> index **)
+
+let index_of facts0 =
+  fold_left insert facts0 M.empty
+
+(** val contains : index -> data -> bool **)
+
+let contains i f =
+  existsb (arguments_eqb (snd f)) (rows i (fst f))
+
+type bindings = (key1 * symbol) list
+
+(** val lookup : bindings -> key1 -> symbol option **)
+
+let rec lookup e x =
+  match e with
+  | [] -> None
+  | p :: e0 ->
+    let (y, s) = p in if Coq_Pos.eqb x y then Some s else lookup e0 x
+
+(** val known : bindings -> argument0 -> symbol option **)
+
+let known e = function
+| RuleVariable x -> lookup e x
+| Symbol s -> Some s
+
+(** val all_known : bindings -> argument0 list -> symbol list option **)
+
+let rec all_known e = function
+| [] -> Some []
+| t0 :: ts0 ->
+  (match known e t0 with
+   | Some s ->
+     (match all_known e ts0 with
+      | Some l -> Some (s :: l)
+      | None -> None)
+   | None -> None)
+
+(** val ground_pattern : bindings -> pattern0 -> data option **)
+
+let ground_pattern e a =
+  match all_known e (snd a) with
+  | Some l -> Some ((fst a), l)
+  | None -> None
+
+(** val unify :
+    bindings -> argument0 list -> symbol list -> bindings option **)
+
+let rec unify e ts l =
+  match ts with
+  | [] -> (match l with
+           | [] -> Some e
+           | _ :: _ -> None)
+  | t0 :: ts0 ->
+    (match l with
+     | [] -> None
+     | s :: l0 ->
+       (match known e t0 with
+        | Some s' -> if symbol_eqb s' s then unify e ts0 l0 else None
+        | None ->
+          (match t0 with
+           | RuleVariable x -> unify ((x, s) :: e) ts0 l0
+           | Symbol _ -> None)))
+
+(** val matches : index -> bindings -> pattern0 list -> bindings list **)
+
+let rec matches i e = function
+| [] -> e :: []
+| a :: patterns0 ->
+  flat_map (fun l ->
+    match unify e (snd a) l with
+    | Some e0 -> matches i e0 patterns0
+    | None -> []) (rows i (fst a))
+
+(** val positive_part : conjunct list -> pattern0 list **)
+
+let positive_part body0 =
+  flat_map (fun c -> match c with
+                     | Present a -> a :: []
+                     | _ -> []) body0
+
+(** val variables_of : pattern0 -> key1 list **)
+
+let variables_of a =
+  flat_map (fun t0 ->
+    match t0 with
+    | RuleVariable x -> x :: []
+    | Symbol _ -> []) (snd a)
+
+(** val member : key1 -> key1 list -> bool **)
+
+let member x l =
+  existsb (Coq_Pos.eqb x) l
+
+(** val distinct0 : key1 list -> bool **)
+
+let rec distinct0 = function
+| [] -> true
+| x :: l0 -> (&&) (negb (member x l0)) (distinct0 l0)
+
+(** val bound : bindings -> key1 -> bool **)
+
+let bound e x =
+  match lookup e x with
+  | Some _ -> true
+  | None -> false
+
+(** val all_some : 'a1 option list -> 'a1 list option **)
+
+let rec all_some = function
+| [] -> Some []
+| o :: l0 ->
+  (match o with
+   | Some x ->
+     (match all_some l0 with
+      | Some l1 -> Some (x :: l1)
+      | None -> None)
+   | None -> None)
+
+(** val comparison_decided : built_in -> symbol -> symbol -> bool **)
+
+let comparison_decided test a b =
+  match test with
+  | Different -> (||) (symbol_eqb a b) (negb ((&&) (is_name a) (is_name b)))
+  | _ -> true
+
+(** val count_decided : bindings -> key1 list -> pattern0 list -> bool **)
+
+let count_decided e local inner =
+  (&&) ((&&) (distinct0 local) (forallb (fun x -> negb (bound e x)) local))
+    (forallb (fun a ->
+      forallb (fun x -> (||) (member x local) (bound e x)) (variables_of a))
+      inner)
+
+(** val decide : index -> bindings -> conjunct -> bool option **)
+
+let decide i e = function
+| Present _ -> Some true
+| Absent a -> option_map (fun f -> negb (contains i f)) (ground_pattern e a)
+| Test (test, x, y) ->
+  (match known e x with
+   | Some a ->
+     (match known e y with
+      | Some b ->
+        if comparison_decided test a b
+        then Some (satisfies test a b)
+        else None
+      | None -> None)
+   | None -> None)
+| Count (n, local, inner) ->
+  if count_decided e local inner
+  then option_map (fun values ->
+         Nat.eqb (length (nodup (list_eq_dec symbol_eq_dec) values)) n)
+         (all_some
+           (map (fun e0 ->
+             all_known e0 (map (fun x -> RuleVariable x) local))
+             (matches i e inner)))
+  else None
+
+(** val decide_all : index -> bindings -> conjunct list -> bool option **)
+
+let rec decide_all i e = function
+| [] -> Some true
+| c :: body1 ->
+  (match decide i e c with
+   | Some b -> if b then decide_all i e body1 else Some false
+   | None -> None)
+
+(** val concluded : index -> bindings -> conclusion -> bool **)
+
+let concluded i e = function
+| Concludes a ->
+  (match ground_pattern e a with
+   | Some f -> contains i f
+   | None -> false)
+| Equates (x, y) ->
+  (match known e x with
+   | Some a -> (match known e y with
+                | Some b -> symbol_eqb a b
+                | None -> false)
+   | None -> false)
+
+(** val complete_for : index -> implication -> bool **)
+
+let complete_for i r =
+  forallb (fun e ->
+    match decide_all i e r.premises with
+    | Some b ->
+      if b
+      then (match r.conclusions with
+            | [] -> false
+            | c :: l -> forallb (concluded i e) (c :: l))
+      else true
+    | None -> false) (matches i [] (positive_part r.premises))
+
+type reason =
+| Stated
+| Derived of key1 list
+
+(** val unify_all :
+    bindings -> pattern0 list -> data list -> bindings option **)
+
+let rec unify_all e patterns facts0 =
+  match patterns with
+  | [] -> (match facts0 with
+           | [] -> Some e
+           | _ :: _ -> None)
+  | a :: patterns0 ->
+    (match facts0 with
+     | [] -> None
+     | f :: facts1 ->
+       if Coq_Pos.eqb (fst a) (fst f)
+       then (match unify e (snd a) (snd f) with
+             | Some e0 -> unify_all e0 patterns0 facts1
+             | None -> None)
+       else None)
+
+(** val concludes : bindings -> data -> conclusion -> bool **)
+
+let concludes e f = function
+| Concludes a ->
+  (match ground_pattern e a with
+   | Some g -> data_eqb f g
+   | None -> false)
+| Equates (_, _) -> false
+
+(** val follows_by : index -> implication -> data list -> data -> bool **)
+
+let follows_by i r supports f =
+  match unify_all [] (positive_part r.premises) supports with
+  | Some e ->
+    (&&) (existsb (concludes e f) r.conclusions)
+      (match decide_all i e r.premises with
+       | Some b -> b
+       | None -> false)
+  | None -> false
+
+(** val founded :
+    knowledge_base -> index -> index -> data M.t -> key1 -> (data * reason)
+    list -> bool **)
+
+let rec founded k i stated_facts earlier next = function
+| [] -> true
+| p :: steps0 ->
+  let (f, reason0) = p in
+  (&&)
+    (match reason0 with
+     | Stated -> contains stated_facts f
+     | Derived supports ->
+       (match all_some (map (fun i0 -> M.find i0 earlier) supports) with
+        | Some supports0 ->
+          existsb (fun r -> follows_by i r supports0 f) k.implications
+        | None -> false))
+    (founded k i stated_facts (M.add next f earlier) (Coq_Pos.succ next)
+      steps0)
+
+(** val conclusion_level :
+    knowledge_base -> (key1 -> nat) -> conclusion -> nat **)
+
+let conclusion_level k level0 = function
+| Concludes a -> level0 (fst a)
+| Equates (_, _) -> level0 k.same_as
+
+(** val above : (key1 -> nat) -> nat -> conjunct -> bool **)
+
+let above level0 n = function
+| Present a -> Nat.leb (level0 (fst a)) n
+| Absent a -> Nat.ltb (level0 (fst a)) n
+| Test (_, _, _) -> true
+| Count (_, _, inner) -> forallb (fun a -> Nat.ltb (level0 (fst a)) n) inner
+
+(** val stratified : knowledge_base -> (key1 -> nat) -> bool **)
+
+let stratified k level0 =
+  (&&) (Nat.eqb (level0 k.same_as) O)
+    (forallb (fun r ->
+      forallb (fun c ->
+        forallb (above level0 (conclusion_level k level0 c)) r.premises)
+        r.conclusions) k.implications)
+
+(** val check_derivations :
+    knowledge_base -> (key1 -> nat) -> (data * reason) list -> bool **)
+
+let check_derivations k level0 steps =
+  let i = index_of (map fst steps) in
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&) (stratified k level0)
+          (forallb (fun step0 ->
+            negb (Coq_Pos.eqb (fst (fst step0)) k.same_as)) steps))
+        (forallb (contains i) k.stated))
+      (founded k i (index_of k.stated) M.empty XH steps))
+    (forallb (complete_for i) k.implications)

@@ -55,6 +55,8 @@ module Nat :
   val eqb : nat -> nat -> bool
 
   val leb : nat -> nat -> bool
+
+  val ltb : nat -> nat -> bool
  end
 
 module Pos :
@@ -156,6 +158,8 @@ module Z :
 
 val zeq_bool : z -> z -> bool
 
+val in_dec : ('a1 -> 'a1 -> bool) -> 'a1 -> 'a1 list -> bool
+
 val nth : nat -> 'a1 list -> 'a1 -> 'a1
 
 val nth_error : 'a1 list -> nat -> 'a1 option
@@ -186,11 +190,15 @@ val firstn : nat -> 'a1 list -> 'a1 list
 
 val skipn : nat -> 'a1 list -> 'a1 list
 
+val nodup : ('a1 -> 'a1 -> bool) -> 'a1 list -> 'a1 list
+
 val seq : nat -> nat -> nat list
 
 type q = { qnum : z; qden : positive }
 
 val inject_Z : z -> q
+
+val qcompare : q -> q -> comparison
 
 val qeq_bool : q -> q -> bool
 
@@ -1302,3 +1310,138 @@ val check_timed :
   problem -> event list -> task -> names -> timeline -> (nat -> key1 list ->
   passage -> case_tree) -> (nat -> case_tree) -> case_tree -> argument ->
   (state -> positive list) -> (q * (nat * key1 list)) list -> q option -> bool
+
+type xsd_value =
+| Text of z list
+| Boolean of bool
+| Numeric of q
+
+type symbol =
+| Name of key1
+| Literal of xsd_value
+
+val is_name : symbol -> bool
+
+type data = key1 * symbol list
+
+type datatype =
+| AnyText
+| AnyBoolean
+| AnyNumber
+| AnyInteger
+
+type built_in =
+| Less
+| LessOrEqual
+| Identical
+| NotIdentical
+| Different
+| Outside of datatype
+
+val symbol_eq_dec : symbol -> symbol -> bool
+
+val symbol_eqb : symbol -> symbol -> bool
+
+val compare_text : z list -> z list -> comparison
+
+val compare_values : xsd_value -> xsd_value -> comparison option
+
+val in_datatype : xsd_value -> datatype -> bool
+
+val satisfies : built_in -> symbol -> symbol -> bool
+
+type argument0 =
+| RuleVariable of key1
+| Symbol of symbol
+
+type pattern0 = key1 * argument0 list
+
+type conjunct =
+| Present of pattern0
+| Absent of pattern0
+| Test of built_in * argument0 * argument0
+| Count of nat * key1 list * pattern0 list
+
+type conclusion =
+| Concludes of pattern0
+| Equates of argument0 * argument0
+
+type implication = { premises : conjunct list; conclusions : conclusion list }
+
+type knowledge_base = { stated : data list; implications : implication list;
+                        same_as : key1 }
+
+val arguments_eqb : symbol list -> symbol list -> bool
+
+val data_eqb : data -> data -> bool
+
+type index = symbol list list M.t
+
+val rows : index -> key1 -> symbol list list
+
+val insert : index -> data -> index
+
+val index_of : data list -> index
+
+val contains : index -> data -> bool
+
+type bindings = (key1 * symbol) list
+
+val lookup : bindings -> key1 -> symbol option
+
+val known : bindings -> argument0 -> symbol option
+
+val all_known : bindings -> argument0 list -> symbol list option
+
+val ground_pattern : bindings -> pattern0 -> data option
+
+val unify : bindings -> argument0 list -> symbol list -> bindings option
+
+val matches : index -> bindings -> pattern0 list -> bindings list
+
+val positive_part : conjunct list -> pattern0 list
+
+val variables_of : pattern0 -> key1 list
+
+val member : key1 -> key1 list -> bool
+
+val distinct0 : key1 list -> bool
+
+val bound : bindings -> key1 -> bool
+
+val all_some : 'a1 option list -> 'a1 list option
+
+val comparison_decided : built_in -> symbol -> symbol -> bool
+
+val count_decided : bindings -> key1 list -> pattern0 list -> bool
+
+val decide : index -> bindings -> conjunct -> bool option
+
+val decide_all : index -> bindings -> conjunct list -> bool option
+
+val concluded : index -> bindings -> conclusion -> bool
+
+val complete_for : index -> implication -> bool
+
+type reason =
+| Stated
+| Derived of key1 list
+
+val unify_all : bindings -> pattern0 list -> data list -> bindings option
+
+val concludes : bindings -> data -> conclusion -> bool
+
+val follows_by : index -> implication -> data list -> data -> bool
+
+val founded :
+  knowledge_base -> index -> index -> data M.t -> key1 -> (data * reason)
+  list -> bool
+
+val conclusion_level : knowledge_base -> (key1 -> nat) -> conclusion -> nat
+
+val above : (key1 -> nat) -> nat -> conjunct -> bool
+
+val stratified : knowledge_base -> (key1 -> nat) -> bool
+
+val check_derivations :
+  knowledge_base -> (key1 -> nat) -> (data * reason) list -> bool

@@ -4,60 +4,8 @@
 module C = Checker
 module R = Reader
 
-(* JSON *)
+open Json
 
-type json = Number of string | String of string | Bool of bool | Null | Array of json list | Object of (string * json) list
-
-let json text =
-  let position = ref 0 in
-  let fail what = R.reject "JSON: %s is expected at byte %d" what !position in
-  let peek () = if !position < String.length text then text.[!position] else '\000' in
-  let rec skip () = match peek () with ' ' | '\n' | '\t' | '\r' -> incr position; skip () | _ -> () in
-  let expect c = skip (); if peek () = c then incr position else fail (String.make 1 c) in
-  let accept c = skip (); if peek () = c then (incr position; true) else false in
-  let constant word value =
-    if !position + String.length word <= String.length text && String.sub text !position (String.length word) = word
-    then (position := !position + String.length word; value) else fail word in
-  let string () =
-    expect '"';
-    let buffer = Buffer.create 16 in
-    let rec characters () = match peek () with
-      | '"' -> incr position
-      | '\000' -> fail "the end of a string"
-      | '\\' -> incr position; Buffer.add_char buffer (peek ()); incr position; characters ()
-      | c -> Buffer.add_char buffer c; incr position; characters () in
-    characters (); Buffer.contents buffer in
-  let items close read =
-    if accept close then [] else
-      let rec more items =
-        let items = read () :: items in
-        if accept ',' then more items else (expect close; List.rev items) in
-      more [] in
-  let rec value () =
-    skip ();
-    match peek () with
-    | '{' -> incr position; Object (items '}' (fun () -> skip (); let name = string () in expect ':'; name, value ()))
-    | '[' -> incr position; Array (items ']' value)
-    | '"' -> String (string ())
-    | 't' -> constant "true" (Bool true)
-    | 'f' -> constant "false" (Bool false)
-    | 'n' -> constant "null" Null
-    | '-' | '0' .. '9' ->
-      let start = !position in
-      while (match peek () with '-' | '+' | '.' | 'e' | 'E' | '0' .. '9' -> true | _ -> false) do incr position done;
-      Number (String.sub text start (!position - start))
-    | _ -> fail "a value" in
-  value ()
-
-let array = function Array items -> items | _ -> R.reject "JSON: an array is expected"
-let string = function String text -> text | _ -> R.reject "JSON: a string is expected"
-let number = function Number text -> text | _ -> R.reject "JSON: a number is expected"
-let int item = match int_of_string_opt (number item) with Some n -> n | None -> R.reject "JSON: a position is expected"
-let optional object_ name = match object_ with
-  | Object fields -> List.assoc_opt name fields
-  | _ -> R.reject "JSON: an object is expected"
-let field object_ name = match optional object_ name with Some item -> item | None -> R.reject "JSON: no field %s" name
-let items object_ name = match optional object_ name with Some item -> array item | None -> []
 let nth list i = match List.nth_opt list i with Some item -> item | None -> R.reject "JSON: no position %d" i
 
 (* Text of the evidence *)

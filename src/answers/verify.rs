@@ -29,29 +29,54 @@ struct TheoremPart<'a> {
     parts: &'a [&'static str],
     /// The proved statement, or the reason why nothing is proved.
     message: &'a str,
+    /// For a certificate with a knowledge base: the answer of the proved checker about its derivations.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    derivations: Option<DerivationsPart<'a>>,
+}
+
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct DerivationsPart<'a> {
+    /// Whether theorem `knowledge` of `proved/Derivations.v` covers the derivations.
+    proved: bool,
+    /// The proved statement, or the reason why nothing is proved.
+    message: &'a str,
 }
 
 impl<'a> VerifyAnswer<'a> {
     /// Creates the answer for the result of a verification, and of the proved checker if it was run.
     pub fn new(report: &'a Verification, theorem: Option<&'a Theorem>) -> Self {
         let theorem = theorem.map(|theorem| match theorem {
-            Theorem::Holds { name, statement, parts } => {
-                TheoremPart { proved: true, name: Some(name), parts, message: statement }
+            Theorem::Holds { name, statement, parts, derivations } => {
+                let derivations = derivations.as_ref().map(|result| match result {
+                    Ok(message) => DerivationsPart { proved: true, message },
+                    Err(message) => DerivationsPart { proved: false, message },
+                });
+                TheoremPart { proved: true, name: Some(name), parts, message: statement, derivations }
             }
-            Theorem::None(reason) => TheoremPart { proved: false, name: None, parts: &[], message: reason },
+            Theorem::None(reason) => {
+                TheoremPart { proved: false, name: None, parts: &[], message: reason, derivations: None }
+            }
         });
         Self { verification: VerificationAnswer::new(report), theorem }
     }
 }
 
-/// Formats a line that states which parts the theorem covers, or why it does not apply.
+/// Formats a line that states which parts the theorem covers, or why it does not apply. With a knowledge base, a line
+/// before it states the same for the derivations.
 pub fn theorem_line(theorem: &Theorem) -> String {
-    let mut line = String::new();
-    let _ = match theorem {
-        Theorem::Holds { name, parts, .. } => {
-            writeln!(line, "proved: theorem `{name}` covers the parts {}", parts.join(", "))
+    let mut lines = String::new();
+    match theorem {
+        Theorem::Holds { name, parts, derivations, .. } => {
+            let _ = match derivations {
+                Some(Ok(_)) => writeln!(lines, "proved: theorem `knowledge` covers the part derivations"),
+                Some(Err(reason)) => writeln!(lines, "derivations NOT proved by a theorem: {reason}"),
+                None => Ok(()),
+            };
+            let _ = writeln!(lines, "proved: theorem `{name}` covers the parts {}", parts.join(", "));
         }
-        Theorem::None(reason) => writeln!(line, "NOT proved by a theorem: {reason}"),
-    };
-    visible(&line).into_owned()
+        Theorem::None(reason) => {
+            let _ = writeln!(lines, "NOT proved by a theorem: {reason}");
+        }
+    }
+    visible(&lines).into_owned()
 }

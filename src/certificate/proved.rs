@@ -4,7 +4,8 @@
 //! `metaplan-proved-prepare` writes evidence for the claim and need not be trusted. One of two other programs checks
 //! the evidence with the function about which theorems are proved: `metaplan-proved-check` for a plan or its absence
 //! (theorems `optimal` and `unsolvable`, or `timed_optimal` if there are timed initial literals), and
-//! `metaplan-proved-front` for a Pareto front (theorem `front_optimal`).
+//! `metaplan-proved-front` for a Pareto front (theorem `front_optimal`). If the certificate has a knowledge base,
+//! `metaplan-proved-knowledge` checks the derivations of its facts (theorem `knowledge`).
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -19,8 +20,9 @@ use crate::message::Message;
 const PREPARE: &str = "metaplan-proved-prepare";
 const CHECK: &str = "metaplan-proved-check";
 const FRONT: &str = "metaplan-proved-front";
-/// Exit status of the programs on success. The next two constants are other exit statuses of `metaplan-proved-check`
-/// and `metaplan-proved-front`, as defined in `proved/ocaml/check.ml` and `check_front.ml`.
+const KNOWLEDGE: &str = "metaplan-proved-knowledge";
+/// Exit status of the programs on success. The next two constants are other exit statuses of all programs but
+/// `metaplan-proved-prepare`, as defined in `proved/ocaml/check.ml`, `check_front.ml` and `check_knowledge.ml`.
 const PROVED: i32 = 0;
 const REJECTED: i32 = 3;
 const NOT_PROVED: i32 = 30;
@@ -32,6 +34,7 @@ const TIMED: &str = "proved, with timed initial literals: ";
 const UNTIMED: &str = "proved: ";
 const COVERED_PARTS: [&str; 3] = ["task", "plan", "argument"];
 const COVERED_FRONT_PARTS: [&str; 2] = ["point", "front"];
+const DERIVATIONS: &str = "derivations";
 
 /// Paths of the programs of the proved checker.
 #[derive(Debug, Clone)]
@@ -39,6 +42,7 @@ pub struct ProvedChecker {
     prepare: PathBuf,
     check: PathBuf,
     front: PathBuf,
+    knowledge: PathBuf,
 }
 
 /// Answer of the proved checker to a certificate, after the comparison with `metaplan-verify`.
@@ -53,6 +57,9 @@ pub enum Theorem {
         statement: String,
         /// Parts of the verification that the theorem covers.
         parts: Vec<&'static str>,
+        /// For a certificate with a knowledge base: the statement of theorem `knowledge` about the derivations, or the
+        /// reason why the theorem does not apply.
+        derivations: Option<Result<String, String>>,
     },
     /// It is not shown that the claim follows from the theorem, for the given reason: for example, the proved checker
     /// does not cover a construct.
@@ -61,7 +68,8 @@ pub enum Theorem {
 
 impl ProvedChecker {
     /// Finds the programs in `folder` if it is given. Otherwise finds them in the directory of the running program or in
-    /// a directory of `PATH`. The program for fronts is not needed for other certificates, and may be absent.
+    /// a directory of `PATH`. The programs for fronts and knowledge bases are not needed for other certificates, and may
+    /// be absent.
     ///
     /// # Errors
     /// M145: no directory has both programs for certificates of a plan.
@@ -77,7 +85,12 @@ impl ProvedChecker {
         let program = |folder: &Path, name| folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
         candidates
             .iter()
-            .map(|folder| Self { prepare: program(folder, PREPARE), check: program(folder, CHECK), front: program(folder, FRONT) })
+            .map(|folder| Self {
+                prepare: program(folder, PREPARE),
+                check: program(folder, CHECK),
+                front: program(folder, FRONT),
+                knowledge: program(folder, KNOWLEDGE),
+            })
             .find(|checker| checker.prepare.is_file() && checker.check.is_file())
             .ok_or_else(|| {
                 let place = match folder {
@@ -130,7 +143,14 @@ impl ProvedChecker {
                 let mut parts: Vec<_> = parts.filter(|part| covered.contains(part)).collect();
                 // The checks of the points of a front have the same name, which is listed once.
                 parts.dedup();
-                return Ok(Theorem::Holds { name, statement, parts });
+                let verified = report.parts.iter().find(|part| part.part == DERIVATIONS);
+                let derivations = verified.map(|_| self.knowledge(directory, stop)).transpose()?;
+                match (verified, &derivations) {
+                    (Some(VerifiedPart { result: Err(_), .. }), Some(Ok(accepted))) => {
+                        format!("the proved checker accepts the derivations ({accepted})")
+                    }
+                    _ => return Ok(Theorem::Holds { name, statement, parts, derivations }),
+                }
             }
             Answer::Accepted(statement) => {
                 format!("the proved checker accepts this certificate ({statement})")
@@ -139,6 +159,26 @@ impl ProvedChecker {
         let reason = format!("the checkers disagree: {disagreement}");
         report.parts.push(VerifiedPart { part: "theorem", result: Err(reason.clone()) });
         Ok(Theorem::None(reason))
+    }
+
+    /// Runs the program for knowledge bases. Returns the proved statement; an error if nothing is proved, with the reason.
+    fn knowledge(
+        &self,
+        directory: &Path,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Result<String, String>, Message> {
+        if !self.knowledge.is_file() {
+            return Ok(Err(format!("the program `{KNOWLEDGE}` is missing")));
+        }
+        let folder = tempfile::tempdir().map_err(|error| failed("a temporary directory", &error))?;
+        let (output, errors) = (folder.path().join("output"), folder.path().join("errors"));
+        let mut check = Command::new(&self.knowledge);
+        check.arg(directory);
+        Ok(match checked(check, KNOWLEDGE, &output, &errors, stop)? {
+            Answer::Accepted(statement) => Ok(statement),
+            Answer::Rejected => Err("not proved".to_owned()),
+            Answer::None(reason) => Err(reason),
+        })
     }
 
     fn answer(&self, directory: &Path, claim: &Claim, stop: &dyn Fn() -> bool) -> Result<Answer, Message> {
@@ -165,15 +205,25 @@ impl ProvedChecker {
             }
             check.arg(&evidence);
         }
-        let output = folder.path().join("output");
-        Ok(match run(check, &output, &errors, stop)? {
-            Ended::Status(PROVED) => Answer::Accepted(read(&output)?),
-            Ended::Status(NOT_PROVED) => Answer::Rejected,
-            Ended::Status(REJECTED) => Answer::None(reason(&output)?),
-            Ended::Status(status) => Answer::None(format!("`{name}` ended with status {status}")),
-            Ended::Other(reason) => Answer::None(format!("`{name}` {reason}")),
-        })
+        checked(check, name, &folder.path().join("output"), &errors, stop)
     }
+}
+
+/// Runs a program that checks with a proved function, and interprets its exit status.
+fn checked(
+    check: Command,
+    name: &str,
+    output: &Path,
+    errors: &Path,
+    stop: &dyn Fn() -> bool,
+) -> Result<Answer, Message> {
+    Ok(match run(check, output, errors, stop)? {
+        Ended::Status(PROVED) => Answer::Accepted(read(output)?),
+        Ended::Status(NOT_PROVED) => Answer::Rejected,
+        Ended::Status(REJECTED) => Answer::None(reason(output)?),
+        Ended::Status(status) => Answer::None(format!("`{name}` ended with status {status}")),
+        Ended::Other(reason) => Answer::None(format!("`{name}` {reason}")),
+    })
 }
 
 enum Answer {

@@ -33,8 +33,9 @@ fn theorem_covers_the_parts_about_the_pddl_files() {
     let covers = "proved: theorem `optimal` covers the parts task, plan, argument\n";
     let no_plan = "proved: theorem `unsolvable` covers the parts task, argument\n";
     let timed = "proved: theorem `timed_optimal` covers the parts task, plan, argument\n";
+    let with_knowledge = format!("proved: theorem `knowledge` covers the part derivations\n{covers}");
     for (certificate, status, line) in [
-        (ugv.as_str(), 0, covers),
+        (ugv.as_str(), 0, with_knowledge.as_str()),
         ("proved/tests/battery", 0, covers),
         (&format!("{STORED}/designs"), 0, covers),
         (&format!("{STORED}/stuck"), 0, no_plan),
@@ -61,6 +62,43 @@ fn theorem_covers_the_parts_about_the_pddl_files() {
     let theorem = json!({"proved": true, "name": "unsolvable", "parts": ["task", "argument"], "message": "proved: there is no plan"});
     assert_eq!(answer["theorem"], theorem, "{answer:#}");
     assert_eq!(verify(&[battery, "--format", "json"]).json().get("theorem"), None);
+    let answer = verify(&[&ugv, "--proved", "--format", "json"]).json();
+    let message = "proved: exactly the 130 facts hold, 9 of them by rules";
+    assert_eq!(answer["theorem"]["derivations"], json!({"proved": true, "message": message}), "{answer:#}");
+}
+
+/// The theorem about the plan also holds if theorem `knowledge` does not apply to the derivations.
+#[test]
+#[cfg(unix)]
+fn answer_about_derivations_is_compared() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ugv = certificate(folder.path(), &["plan", "missions/ugv.toml"]);
+    let check = "echo 'proved: the plan of 4 steps is optimal, metric 408'";
+    let covers = "proved: theorem `optimal` covers the parts task, plan, argument\n";
+    for (script, line) in [
+        (None, "derivations NOT proved by a theorem: the program `metaplan-proved-knowledge` is missing"),
+        (
+            Some("echo 'rejected: not covered: keys'; exit 3"),
+            "derivations NOT proved by a theorem: not covered: keys",
+        ),
+        (Some("echo 'not proved'; exit 30"), "derivations NOT proved by a theorem: not proved"),
+        (Some("echo 'proved: exactly'"), "proved: theorem `knowledge` covers the part derivations"),
+    ] {
+        let programs = stubs("echo evidence", check);
+        if let Some(script) = script {
+            add_stub(programs.path(), "metaplan-proved-knowledge", script);
+        }
+        let outcome = with_stubs(&ugv, &programs, &[]);
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+        assert!(outcome.stdout.ends_with(&format!("{line}\n{covers}")), "{line}: {outcome:#?}");
+    }
+    change(&ugv, "origin.json", &|text| text.replace("lessThan", "greaterThan"));
+    let programs = stubs("echo evidence", check);
+    add_stub(programs.path(), "metaplan-proved-knowledge", "echo 'proved: exactly'");
+    let outcome = with_stubs(&ugv, &programs, &[]);
+    assert_eq!(outcome.status, 30, "{outcome:#?}");
+    let line = "theorem     failed: the checkers disagree: the proved checker accepts the derivations (proved: exactly)";
+    assert!(outcome.stdout.contains(line), "{outcome:#?}");
 }
 
 /// A wrong claim is rejected by both checkers, which is not a disagreement.
@@ -83,16 +121,19 @@ fn both_checkers_reject_a_worse_plan() {
 
 fn stubs(prepare: &str, check: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    for (name, script) in [("metaplan-proved-prepare", prepare), ("metaplan-proved-check", check)] {
-        let path = folder.path().join(name);
-        std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).expect("written");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt as _;
-            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).expect("executable");
-        }
-    }
+    add_stub(folder.path(), "metaplan-proved-prepare", prepare);
+    add_stub(folder.path(), "metaplan-proved-check", check);
     folder
+}
+
+fn add_stub(folder: &Path, name: &str, script: &str) {
+    let path = folder.join(name);
+    std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).expect("written");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).expect("executable");
+    }
 }
 
 fn with_stubs(certificate: &str, programs: &tempfile::TempDir, options: &[&str]) -> Outcome {
