@@ -126,18 +126,20 @@ impl Drop for ConnectionGuard {
     }
 }
 
-/// Answers a connection on a new thread, with status 503 if there are too many connections.
+/// Answers a connection on a new thread, or with status 503 if there are too many connections.
 fn receive(shared: &Arc<SharedState>, mut stream: TcpStream) {
     let connections = shared.open_connections.fetch_add(1, Ordering::AcqRel);
     let guard = ConnectionGuard(Arc::clone(shared));
-    let is_full = connections >= MAX_CONNECTIONS;
+    if connections >= MAX_CONNECTIONS {
+        // The short text fits into the empty send buffer of a new connection, so nothing blocks.
+        let _ = stream.set_nonblocking(true);
+        let _ = refuse(&mut stream, (503, "Service Unavailable"));
+        let _ = stream.shutdown(Shutdown::Both);
+        return;
+    }
     let answered = std::thread::Builder::new().spawn(move || {
         // A write error means that the client has disconnected.
-        let _ = if is_full {
-            refuse(&mut stream, (503, "Service Unavailable"))
-        } else {
-            answer(&guard.0, &mut stream)
-        };
+        let _ = answer(&guard.0, &mut stream);
         let _ = stream.shutdown(Shutdown::Both);
         drop(guard);
     });
