@@ -15,7 +15,7 @@ use crate::file::{self, Kind, source};
 use crate::message::{Errors, Message, did_you_mean};
 use crate::number;
 
-/// Maximum number of faults that are reported. Each costs two passes over the text, and a file of another kind can
+/// Maximum number of faults that are reported. Each costs a few passes over the text, and a file of another kind can
 /// have thousands.
 const MAX_FAULTS: usize = 50;
 
@@ -241,11 +241,7 @@ fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str)
                     .with_source(text);
             messages.push((place, message));
         }
-        let is_toml = remaining.parse::<toml::Table>().is_ok();
-        let Some(blanked) = error.span().filter(|_| is_toml).and_then(|span| without(&remaining, span))
-        else {
-            break;
-        };
+        let Some(blanked) = error.span().and_then(|span| without(&remaining, span)) else { break };
         match toml::from_str::<S>(&blanked) {
             Ok(_) => break,
             Err(next) => (remaining, error) = (blanked, next),
@@ -255,10 +251,12 @@ fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str)
     messages.into_iter().map(|(_, message)| message).collect()
 }
 
-/// Overwrites the lines of a byte range with blanks, or the whole section if the first line is a
-/// section heading. Line numbers do not change. Returns `None` if this does not change the text.
+/// Overwrites the lines of a byte range with blanks, or the whole section if the first line is a section heading. If
+/// the remainder is not TOML, overwrites the lines of the smallest possible entry with this range instead. Line numbers
+/// do not change. Returns `None` if the text is not TOML, or if nothing can be overwritten.
 fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
     let begin = text.get(..place.start)?.rfind('\n').map_or(0, |at| at + 1);
+    let document = DeTable::parse(text).ok()?;
     let line_end =
         |from: usize| text.get(from..).and_then(|rest| rest.find('\n')).map_or(text.len(), |at| from + at);
     let mut end = line_end(place.end.max(begin));
@@ -266,11 +264,37 @@ fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
         let next = text.get(end..)?.match_indices("\n[").next();
         end = next.map_or(text.len(), |(at, _)| end + at);
     }
+    let mut entries = Vec::new();
+    add_enclosing(&DeValue::Table(document.into_inner()), place.start, &mut entries);
+    entries.sort_by_key(ExactSizeIterator::len);
+    let line_begin = |at: usize| text.get(..at).and_then(|before| before.rfind('\n')).map_or(0, |at| at + 1);
+    let of_entries = entries.iter().map(|entry| line_begin(entry.start)..line_end(entry.end));
+    let is_toml = |blanked: &String| *blanked != text && DeTable::parse(blanked).is_ok();
+    std::iter::once(begin..end).chain(of_entries).filter_map(|range| blanked(text, range)).find(is_toml)
+}
+
+/// Adds the ranges of all entries, from key to value, that contain the byte offset `at`.
+fn add_enclosing(value: &DeValue<'_>, at: usize, entries: &mut Vec<std::ops::Range<usize>>) {
+    match value {
+        DeValue::Table(table) => {
+            for (key, value) in table {
+                let entry = key.span().start..value.span().end;
+                entries.extend(entry.contains(&at).then_some(entry));
+                add_enclosing(value.get_ref(), at, entries);
+            }
+        }
+        DeValue::Array(array) => array.iter().for_each(|value| add_enclosing(value.get_ref(), at, entries)),
+        _ => {}
+    }
+}
+
+/// Overwrites a byte range of a text with blanks.
+fn blanked(text: &str, range: std::ops::Range<usize>) -> Option<String> {
+    let (begin, end) = (range.start, range.end);
     let blank: String = text.get(begin..end)?.chars().map(|c| if c == '\n' { c } else { ' ' }).collect();
     // Each character becomes one blank, so lines and columns stay as they are. Byte offsets change if a
     // character has several bytes.
-    let blanked = format!("{}{blank}{}", text.get(..begin)?, text.get(end..)?);
-    (blanked != text).then_some(blanked)
+    Some(format!("{}{blank}{}", text.get(..begin)?, text.get(end..)?))
 }
 
 fn key_suggestion(message: &str) -> String {
@@ -304,6 +328,24 @@ mod tests {
             let text = text.concat();
             let error = toml::from_str::<Empty>(&text).expect_err("unknown keys");
             assert_eq!(mistakes::<Empty>(&text, error, "m.toml").len(), expected);
+        }
+    }
+
+    #[test]
+    fn values_of_several_lines_are_one_fault() {
+        for value in
+            ["[\n 1,\n]", "{ a = [\n 1,\n], b = 2 }", "'''\nb\n'''", "[\n { a = 1 },\n { b = 2 },\n]"]
+        {
+            let text = format!("first = {value}\nsecond = 1\nthird = {value}\n");
+            let error = toml::from_str::<Empty>(&text).expect_err("unknown keys");
+            let faults: Vec<String> = mistakes::<Empty>(&text, error, "m.toml")
+                .into_iter()
+                .map(|message| format!("{:?} {}", message.line, message.message))
+                .collect();
+            let lines = value.matches('\n').count();
+            let expected = [(1, "first"), (lines + 2, "second"), (lines + 3, "third")]
+                .map(|(line, name)| format!("Some({line}) unknown field `{name}`, there are no fields"));
+            assert_eq!(faults, expected, "{text}");
         }
     }
 }

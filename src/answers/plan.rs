@@ -59,8 +59,8 @@ pub struct PlanAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<f64>")]
     makespan: Option<Value>,
-    /// If no plan exists, but one would exist with all designs: a minimal set of unavailable designs
-    /// without which no plan exists, even if all other designs are available.
+    /// If no plan exists, but one would exist with all designs of the knowledge base: a minimal set of unavailable
+    /// designs without which no plan exists, even if all other designs of the knowledge base are available.
     #[serde(skip_serializing_if = "Option::is_none")]
     blocking: Option<Vec<String>>,
     /// If no plan exists: numeric functions without a value that actions need, if there are any.

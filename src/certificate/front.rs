@@ -67,7 +67,7 @@ pub fn write_front(
         (PROBLEM, print_problem(problem)),
         (FRONT, claim.text()),
     ];
-    files.extend(knowledge::files(mission)?.into_iter().flatten());
+    files.extend(knowledge::files(mission, limits)?.into_iter().flatten());
     let name = directory.display().to_string();
     let failed = |error: std::io::Error| {
         Message::at("M109", &name, None, format!("the directory cannot be written: {}", error.kind()))

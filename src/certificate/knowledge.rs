@@ -4,6 +4,7 @@
 
 use ontology::OutputSyntax;
 use pddl::print_problem;
+use planner::Limits;
 use rules::Engine;
 
 use ::verify::derivations::DERIVATIONS;
@@ -15,7 +16,14 @@ use crate::knowledge::{Stated, rule_text};
 use crate::message::Message;
 use crate::mission::Mission;
 
-pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String); 3]>, Message> {
+/// Returns the names and texts of the three files, or `None` without a knowledge base.
+///
+/// # Errors
+/// The knowledge base cannot be read again, or a limit was reached (M120).
+pub(super) fn files(
+    mission: &Mission,
+    limits: &Limits,
+) -> Result<Option<[(&'static str, String); 3]>, Message> {
     let Some(knowledge) = mission.knowledge() else { return Ok(None) };
     let sources = knowledge.sources();
     let first = |messages: Vec<Message>| {
@@ -38,11 +46,35 @@ pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String);
         changes: knowledge.statements(),
     };
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
+    let late =
+        |_| Message::error("M120", "no certificate: a limit was reached before its knowledge was derived");
+    limits.check().map_err(late)?;
     // Derivations refer to rules by their positions in this document, so the engine is built from the document.
     let Stated { symbols, program, facts, .. } = stated(&document, &origin).map_err(|error| wrong(&error))?;
-    let engine = Engine::new(symbols, program, facts)
-        .map_err(|errors| first(errors.iter().map(Message::from_rules).collect()))?;
+    limits.check().map_err(late)?;
+    let interruptible = rules::Limits { interrupt: Some(limits.into()), ..rules::Limits::default() };
+    let engine = Engine::with_limits(symbols, program, facts, interruptible);
+    limits.check().map_err(late)?;
+    let engine = engine.map_err(|errors| first(errors.iter().map(Message::from_rules).collect()))?;
     let derivations = derivations::write(&engine).map_err(|error| wrong(&error))?;
     let origin = serde_json::to_string(&origin).map_err(|error| wrong(&error))?;
     Ok(Some([(DOCUMENT, document), (ORIGIN, origin), (DERIVATIONS, derivations)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::time::Duration;
+
+    use super::*;
+    use crate::setup::Setup;
+
+    #[test]
+    fn nothing_is_derived_after_the_deadline() {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
+        let mission = Setup::read(&manifest).expect("the mission is read").mission;
+        assert!(files(&mission, &Limits::none()).is_ok_and(|files| files.is_some()));
+        let error = files(&mission, &Limits::none().with_time(Duration::ZERO)).expect_err("too late");
+        assert!(error.code == "M120" && error.message.contains("a limit was reached"), "{error}");
+    }
 }

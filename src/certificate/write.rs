@@ -88,7 +88,7 @@ impl Contents<'_> {
 /// The solution has no certificate, or one that is too large or would be rejected (M120); the knowledge base
 /// cannot be read again; or the directory cannot be written (M109).
 pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Result<(), Message> {
-    write_with(directory, contents, knowledge::files(contents.mission)?.into_iter().flatten(), limits)
+    write_with(directory, contents, knowledge::files(contents.mission, limits)?.into_iter().flatten(), limits)
 }
 
 pub(super) fn write_with(

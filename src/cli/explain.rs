@@ -150,6 +150,9 @@ fn code(name: &str, arguments: &Arguments, common: &Common) -> Result<Exit, Fail
     Ok(Exit::Done)
 }
 
+/// Without a proof, the reason is not always a limit: reasoning may have failed, for example.
+const NO_PLAN: &str = "no plan was found, and its absence is not proved\n";
+
 fn plan_text(answer: &BestPlan) -> String {
     answer.steps.iter().fold(String::new(), |text, step| text + "    " + &step.summary() + "\n")
 }
@@ -157,12 +160,9 @@ fn plan_text(answer: &BestPlan) -> String {
 fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     let cost = match (&answer.cost, answer.proved) {
         (None, true) => return "there is no plan".to_owned(),
-        (None, false) => return "not known: a limit was reached first".to_owned(),
+        (None, false) => return "not known: no plan was found, and its absence is not proved".to_owned(),
         (Some(cost), false) => {
-            return format!(
-                "a plan costs {}; a limit was reached before a better one was ruled out",
-                decimal(cost)
-            );
+            return format!("a plan costs {}; it is not proved that no plan is better", decimal(cost));
         }
         (Some(cost), true) => cost,
     };
@@ -210,7 +210,11 @@ fn why_text(why: &Availability) -> String {
         && way.len() > 1
     {
         let names = way.iter().map(|alteration| alteration.name.as_str()).collect::<Vec<_>>().join(", ");
-        let _ = writeln!(text, "{} causes, all of which must be removed: {names}", way.len());
+        let _ = writeln!(
+            text,
+            "{} causes; if all of them were removed, it would be available: {names}",
+            way.len()
+        );
     }
     text
 }
@@ -220,10 +224,10 @@ fn design_text(found: &DesignExplanation) -> String {
     let mut text = String::new();
     let functions = availability.functions.join(", ");
     let used: Vec<String> = found.used.iter().map(ToString::to_string).collect();
-    let plan = if best.proved { "the best plan" } else { "the best plan so far (a limit was reached)" };
+    let plan = if best.proved { "the best plan" } else { "the best plan so far (not proved best)" };
     match (&best.cost, &used[..]) {
         (None, _) if best.proved => text += "there is no plan\n",
-        (None, _) => text += "no plan was found before a limit was reached\n",
+        (None, _) => text += NO_PLAN,
         (Some(cost), []) => {
             let _ = writeln!(text, "{plan} costs {} and does not use it", decimal(cost));
         }
@@ -289,11 +293,11 @@ fn changes_text(found: &SmallestChanges) -> String {
     let SmallestChanges { best, changes, complete, unexamined, .. } = found;
     let mut text = match (&best.cost, best.proved) {
         (None, true) => "there is no plan\n".to_owned(),
-        (None, false) => "no plan was found before a limit was reached\n".to_owned(),
+        (None, false) => NO_PLAN.to_owned(),
         (Some(cost), true) => format!("the best plan costs {}\n{}", decimal(cost), plan_text(best)),
         (Some(cost), false) => {
             let plan = plan_text(best);
-            format!("the best plan so far (a limit was reached) costs {}\n{plan}", decimal(cost))
+            format!("the best plan so far (not proved best) costs {}\n{plan}", decimal(cost))
         }
     };
     match (changes.is_empty(), complete) {
@@ -312,7 +316,7 @@ fn changes_text(found: &SmallestChanges) -> String {
         text += &plan_text(&change.then);
     }
     if !complete {
-        text += "a limit was reached: other changes were not examined\n";
+        text += "a plan is not proved best: other changes were not examined\n";
     }
     text + &unexamined_text(unexamined)
 }

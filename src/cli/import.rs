@@ -92,9 +92,13 @@ fn two(text: &str) -> Result<(String, String), String> {
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let Form::CamaraMap(map) = &arguments.what;
-    let is_name = !map.name.is_empty() && map.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    let is_name = map.name.starts_with(|c: char| c.is_ascii_alphabetic())
+        && map.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     if !is_name {
-        let text = format!("`{}` cannot name a mission; use letters, digits and `_`", map.name);
+        let text = format!(
+            "`{}` cannot name a mission; use letters, digits and `_`, and begin with a letter",
+            map.name
+        );
         return Err(Failure::usage(Message::error("M107", text)));
     }
     let file = source(&map.file)?;

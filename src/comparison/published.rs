@@ -12,7 +12,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
-use crate::comparison::coadaptation::{Coadaptation, Traversal};
+use crate::comparison::coadaptation::{Arc, Coadaptation, Traversal};
 use crate::comparison::process::Action;
 use probabilistic::Number;
 
@@ -58,30 +58,31 @@ impl Published {
 }
 
 /// Returns at most `max_routes` simple routes from start to goal, in ascending length. The length of an arc is its
-/// least time over all configurations. The search stops after 2,000,000 partial routes with the routes found until
+/// least time over all configurations. Arcs that no configuration can traverse are in no route. The search stops after 2,000,000 partial routes with the routes found until
 /// then.
 pub fn shortest_routes(mission: &Coadaptation, max_routes: usize) -> Vec<Vec<usize>> {
-    let length = |arc: usize| {
-        let by = mission.arcs[arc].by.iter().flatten().map(|traversal| traversal.time.to_f64());
-        by.fold(f64::INFINITY, f64::min)
+    // The queue needs totally ordered lengths, so they are rounded to millionths of the time unit. Sums of lengths near
+    // the maximum saturate.
+    let scaled = |arc: &Arc| {
+        let times = arc.by.iter().flatten().map(|traversal| traversal.time.to_f64());
+        times.min_by(f64::total_cmp).map(|time| (time * 1e6).round() as u128)
     };
-    // The queue needs totally ordered lengths, so they are rounded to millionths of the time unit.
-    let scaled = |arc: usize| (length(arc) * 1e6).round() as u64;
+    let lengths: Vec<Option<u128>> = mission.arcs.iter().map(scaled).collect();
     // The exact distance to the goal is the A* heuristic, so routes are completed in ascending
     // length.
-    let distances = to_goal(mission, &scaled);
-    let mut queue =
-        BinaryHeap::from([Reverse((distances[mission.start].unwrap_or(u64::MAX), Vec::<usize>::new()))]);
+    let distances = to_goal(mission, &lengths);
+    let begin = distances[mission.start].map(|distance| Reverse((distance, Vec::<usize>::new())));
+    let mut queue: BinaryHeap<_> = begin.into_iter().collect();
     let mut leaving = vec![Vec::new(); mission.places.len()];
     for (number, arc) in mission.arcs.iter().enumerate() {
         leaving[arc.from].push(number);
     }
     let (mut routes, mut steps) = (Vec::new(), 0);
     while routes.len() < max_routes
-        && let Some(Reverse((estimate, route))) = queue.pop()
+        && let Some(Reverse((_, route))) = queue.pop()
     {
         steps += 1;
-        if estimate == u64::MAX || steps > MAX_PARTIAL_ROUTES {
+        if steps > MAX_PARTIAL_ROUTES {
             break;
         }
         let at = route.last().map_or(mission.start, |arc| mission.arcs[*arc].to);
@@ -89,18 +90,19 @@ pub fn shortest_routes(mission: &Coadaptation, max_routes: usize) -> Vec<Vec<usi
             routes.push(route);
             continue;
         }
-        let so_far: u64 = route.iter().map(|arc| scaled(*arc)).sum();
+        let so_far = route.iter().filter_map(|arc| lengths[*arc]).fold(0, u128::saturating_add);
         let visited: BTreeSet<usize> =
             route.iter().map(|arc| mission.arcs[*arc].from).chain(std::iter::once(at)).collect();
         for number in &leaving[at] {
             let arc = &mission.arcs[*number];
             // Routes are simple paths.
             if !visited.contains(&arc.to)
-                && let Some(distance) = distances[arc.to]
+                && let (Some(length), Some(distance)) = (lengths[*number], distances[arc.to])
             {
                 let mut longer = route.clone();
                 longer.push(*number);
-                queue.push(Reverse((so_far + scaled(*number) + distance, longer)));
+                let estimate = so_far.saturating_add(length).saturating_add(distance);
+                queue.push(Reverse((estimate, longer)));
             }
         }
     }
@@ -108,13 +110,13 @@ pub fn shortest_routes(mission: &Coadaptation, max_routes: usize) -> Vec<Vec<usi
 }
 
 /// Returns the length of the shortest route from each place to the goal; `None` if no route exists.
-fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<u64>> {
+fn to_goal(mission: &Coadaptation, lengths: &[Option<u128>]) -> Vec<Option<u128>> {
     let mut entering = vec![Vec::new(); mission.places.len()];
     for (number, arc) in mission.arcs.iter().enumerate() {
         entering[arc.to].push(number);
     }
-    let mut best: Vec<Option<u64>> = vec![None; mission.places.len()];
-    let mut queue = BinaryHeap::from([Reverse((0_u64, mission.goal))]);
+    let mut best: Vec<Option<u128>> = vec![None; mission.places.len()];
+    let mut queue = BinaryHeap::from([Reverse((0_u128, mission.goal))]);
     while let Some(Reverse((so_far, place))) = queue.pop() {
         // Dijkstra's algorithm: the first visit has the least distance.
         if best[place].is_some() {
@@ -123,8 +125,8 @@ fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<
         best[place] = Some(so_far);
         for number in &entering[place] {
             let from = mission.arcs[*number].from;
-            if best[from].is_none() {
-                queue.push(Reverse((so_far + length(*number), from)));
+            if let (None, Some(length)) = (best[from], lengths[*number]) {
+                queue.push(Reverse((so_far.saturating_add(length), from)));
             }
         }
     }
@@ -182,4 +184,48 @@ pub fn published(mission: &Coadaptation, priority: Priority) -> Option<Published
         energy: values[1],
         not_collided: values[2],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use num_bigint::BigInt;
+    use num_rational::BigRational;
+
+    use super::*;
+    use crate::comparison::coadaptation::Configuration;
+
+    #[test]
+    fn routes_have_traversable_arcs_and_may_be_long() {
+        let arc = |from, to, exponent: Option<u32>| {
+            let traversal = exponent.map(|exponent| Traversal {
+                time: BigRational::from_integer(BigInt::from(10).pow(exponent)),
+                energy: BigRational::default(),
+                success: BigRational::from_integer(1.into()),
+                hit: BigRational::default(),
+            });
+            Arc { from, to, by: vec![traversal] }
+        };
+        let check = |arcs: Vec<Arc>, expected: &[&[usize]]| {
+            let configuration =
+                Configuration { name: "c".to_owned(), components: Vec::new(), available: true };
+            let mission = Coadaptation {
+                places: ["a", "b", "c"].map(str::to_owned).to_vec(),
+                start: 0,
+                goal: 2,
+                configurations: vec![configuration],
+                initial: 0,
+                arcs,
+                switches: vec![vec![None]],
+                battery: None,
+                loss: None,
+            };
+            assert_eq!(shortest_routes(&mission, ROUTES), expected);
+        };
+        let long = |direct| vec![arc(0, 1, Some(14)), arc(0, 2, direct), arc(1, 2, Some(14))];
+        check(long(Some(15)), &[&[0, 2], &[1]]);
+        check(long(Some(13)), &[&[1], &[0, 2]]);
+        check(long(None), &[&[0, 2]]);
+        check(vec![arc(0, 1, Some(300)), arc(1, 2, Some(300))], &[&[0, 1]]);
+        check(vec![arc(0, 1, Some(0)), arc(1, 2, None)], &[]);
+    }
 }

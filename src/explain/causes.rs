@@ -81,19 +81,21 @@ impl PartialEq for Cause {
 pub struct Causes {
     /// The causes. Empty if the design is available, or if no cause was found.
     pub causes: Vec<Cause>,
-    /// `true` if exactly one minimal set of alterations was found. Unless another set was missed, each cause then has
-    /// to be removed.
-    pub are_all_needed: bool,
+    /// `true` if the design becomes available when all these causes are removed: exactly one minimal set of
+    /// alterations was found. Other sets may be missing.
+    pub suffice_together: bool,
 }
 
 /// Returns the failed components and measurements that are found to contribute to ruling a design out. Some may be
 /// missing, since the number of sets of alterations that are tried is limited.
 pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     if design.available {
-        return Causes { causes: Vec::new(), are_all_needed: false };
+        return Causes { causes: Vec::new(), suffice_together: false };
     }
     let ways = ways(knowledge, design).sets;
-    Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
+    let causes = causes_of(knowledge, design, &ways);
+    let suffice_together = matches!(&ways[..], [way] if way.len() == causes.len());
+    Causes { causes, suffice_together }
 }
 
 /// Returns a cause for each different alteration in `ways`. Omits causes with which reasoning

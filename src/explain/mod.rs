@@ -42,8 +42,8 @@ pub struct DesignExplanation {
     pub best: BestPlan,
     /// Numbers of the steps of `best` that use the design, from 1.
     pub used: Vec<usize>,
-    /// The best plan with this design as the only one for its functions. If the design is
-    /// unavailable, it is assumed to be available.
+    /// The best plan with this design as the only one for its functions. If the design is unavailable, it is assumed to
+    /// be available. Other designs that only the problem states keep their availability.
     pub alone: BestPlan,
     /// The best plan if the design is not available.
     pub without: BestPlan,

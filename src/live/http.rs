@@ -48,14 +48,17 @@ pub fn serve(
             };
             let is_full = counter.fetch_add(1, Ordering::AcqRel) >= max_connections;
             let (answer, guard) = (Arc::clone(&answer), ConnectionGuard(Arc::clone(&counter)));
+            if is_full {
+                // The short text fits into the empty send buffer of a new connection, so nothing blocks.
+                let _ = stream.set_nonblocking(true);
+                let _ = answer(Err((503, "Service Unavailable")), &mut stream);
+                let _ = stream.shutdown(Shutdown::Both);
+                continue;
+            }
             let answered = std::thread::Builder::new().spawn(move || {
                 // An error means that the client has disconnected.
-                let _ = if is_full {
-                    answer(Err((503, "Service Unavailable")), &mut stream)
-                } else {
-                    Request::read(&mut stream, CLIENT_TIMEOUT)
-                        .and_then(|request| answer(request, &mut stream))
-                };
+                let _ = Request::read(&mut stream, CLIENT_TIMEOUT)
+                    .and_then(|request| answer(request, &mut stream));
                 let _ = stream.shutdown(Shutdown::Both);
                 drop(guard);
             });

@@ -275,7 +275,7 @@ impl Adaptation<'_> {
                 cancel(self.beliefs, running, because, answers);
                 true
             }
-            Interruption::Suspend { status, because, blocking } => {
+            Interruption::Suspend { reason, status, because, blocking } => {
                 suspend(self.beliefs, running, reason, answers);
                 answers.push(Answer::PlanNone { status, because, blocking });
                 true

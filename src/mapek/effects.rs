@@ -135,11 +135,10 @@ pub(super) fn cancel(beliefs: &mut Beliefs, running: Running, because: String, a
     beliefs.running = Some(Running { cancelling: true, ..running });
 }
 
-pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, answers: &mut Vec<Answer>) {
+pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, because: String, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     beliefs.stuck = true;
     if !running.suspended {
-        let because = format!("{reason}; no other design can be used, and no plan exists without the action");
         effect(beliefs, running.action, Command::Suspend { because }, answers);
     }
     beliefs.running = Some(Running { suspended: true, provisional: false, ..running });

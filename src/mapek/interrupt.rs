@@ -14,8 +14,16 @@ use crate::number;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Interruption {
     None,
-    Cancel { because: String },
-    Suspend { status: &'static str, because: String, blocking: Vec<String> },
+    Cancel {
+        because: String,
+    },
+    /// Suspends the action for `reason`. The other fields describe the missing plan without the action.
+    Suspend {
+        reason: String,
+        status: &'static str,
+        because: String,
+        blocking: Vec<String>,
+    },
 }
 
 /// Decides about the action under way, given the `reason` why it may have to be interrupted. `going_on` is the plan
@@ -37,20 +45,29 @@ pub(super) fn weigh(
             }
         }),
         (Some(_), None) => Interruption::None,
-        (None, Some(_)) => {
-            let because = if can_go_on {
-                "no plan exists that continues the action"
-            } else {
-                "no other design can be used"
-            };
-            Interruption::Cancel { because: format!("{reason}; {because}") }
-        }
-        (None, None) if can_go_on => Interruption::None,
-        (None, None) => Interruption::Suspend {
-            status: if without.proved { "unsolvable" } else { "unknown" },
-            because: without.because,
-            blocking: without.blocking,
+        (None, Some(_)) => Interruption::Cancel {
+            because: format!("{reason}; {}", no_continuation(can_go_on, going_on.proved)),
         },
+        (None, None) if can_go_on => Interruption::None,
+        (None, None) => {
+            let (status, no_plan) = if without.proved {
+                ("unsolvable", "no plan exists without the action")
+            } else {
+                ("unknown", "no plan without the action was found")
+            };
+            let reason = format!("{reason}; {}, and {no_plan}", no_continuation(can_go_on, going_on.proved));
+            Interruption::Suspend { reason, status, because: without.because, blocking: without.blocking }
+        }
+    }
+}
+
+/// Returns the reason not to continue the action. Claims the absence of plans only if it is `proved`.
+fn no_continuation(can_go_on: bool, proved: bool) -> &'static str {
+    match (can_go_on, proved) {
+        (true, true) => "no plan exists that continues the action",
+        (true, false) => "no plan that continues the action was found",
+        (false, true) => "no other design can be used",
+        (false, false) => "no plan with another design was found",
     }
 }
 
@@ -61,11 +78,11 @@ mod tests {
     use super::{Interruption, weigh};
     use crate::mapek::ask::Outcome;
 
-    fn outcome(is_plan: bool) -> Outcome {
+    fn outcome(is_plan: bool, proved: bool) -> Outcome {
         Outcome {
             steps: is_plan.then(Vec::new),
             cost: BigRational::default(),
-            proved: true,
+            proved,
             because: "nothing serves".to_owned(),
             blocking: vec!["fd_a".to_owned()],
         }
@@ -73,7 +90,8 @@ mod tests {
 
     fn check(can_go_on: bool, goes_on: bool, without: bool, gained: Option<i64>, expected: &Interruption) {
         let gained = gained.map(|gained| BigRational::from_integer(gained.into()));
-        let decision = weigh("it is lost", can_go_on, &outcome(goes_on), outcome(without), gained);
+        let decision =
+            weigh("it is lost", can_go_on, &outcome(goes_on, true), outcome(without, true), gained);
         assert_eq!(&decision, expected, "{can_go_on} {goes_on} {without}");
     }
 
@@ -81,6 +99,8 @@ mod tests {
     fn an_action_is_interrupted_with_a_benefit_or_if_no_plan_continues_it() {
         let cancel = |because: &str| Interruption::Cancel { because: format!("it is lost; {because}") };
         let suspend = Interruption::Suspend {
+            reason: "it is lost; no other design can be used, and no plan exists without the action"
+                .to_owned(),
             status: "unsolvable",
             because: "nothing serves".to_owned(),
             blocking: vec!["fd_a".to_owned()],
@@ -92,5 +112,28 @@ mod tests {
         check(true, false, true, None, &cancel("no plan exists that continues the action"));
         check(true, false, false, None, &Interruption::None);
         check(false, false, false, None, &suspend);
+    }
+
+    #[test]
+    fn plans_that_were_not_found_are_not_said_to_be_impossible() {
+        let decide = |can_go_on, without| {
+            weigh("it is lost", can_go_on, &outcome(false, false), outcome(without, false), None)
+        };
+        for (can_go_on, expected) in [
+            (false, "it is lost; no plan with another design was found"),
+            (true, "it is lost; no plan that continues the action was found"),
+        ] {
+            let because = expected.to_owned();
+            assert_eq!(decide(can_go_on, true), Interruption::Cancel { because });
+        }
+        let reason =
+            "it is lost; no plan with another design was found, and no plan without the action was found";
+        let suspend = Interruption::Suspend {
+            reason: reason.to_owned(),
+            status: "unknown",
+            because: "nothing serves".to_owned(),
+            blocking: vec!["fd_a".to_owned()],
+        };
+        assert_eq!(decide(false, false), suspend);
     }
 }

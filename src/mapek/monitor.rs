@@ -231,11 +231,8 @@ impl BeliefUpdate<'_> {
             self.changes.base.max(if was_known && is_known { Base::Stated } else { Base::Watched });
         let engine = knowledge.engine();
         let name = |fact: &Fact| engine.symbols().value(fact.predicate).as_name().map_or("", local_name);
-        let is_replaced = |gone: &Fact| {
-            let is_successor =
-                |new: &Fact| new.predicate == gone.predicate && new.arguments[0] == gone.arguments[0];
-            delta.insert.iter().any(is_successor)
-        };
+        let subject = |fact: &Fact| (fact.predicate, fact.arguments.first().copied());
+        let replaced: HashSet<_> = delta.insert.iter().map(subject).collect();
         let insert = delta.insert.iter().map(|fact| (fact, true));
         let delete = delta.delete.iter().map(|fact| (fact, false));
         for (fact, is_insertion) in insert.chain(delete) {
@@ -247,7 +244,7 @@ impl BeliefUpdate<'_> {
             if VALUE_PROPERTIES.contains(&name) {
                 // A derived value is an estimation, which plans depend on. A reported value is a measurement.
                 self.changes.facts |=
-                    if is_insertion { !engine.is_asserted(fact) } else { !is_replaced(fact) };
+                    if is_insertion { !engine.is_asserted(fact) } else { !replaced.contains(&subject(fact)) };
             }
         }
     }

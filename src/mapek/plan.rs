@@ -129,6 +129,6 @@ pub(super) fn from_scratch(question: &Question<'_>, limits: Limits, watch: &Watc
             blocking: Vec::new(),
         },
         (Status::Unsolvable, None) => no_plan(true, "no plan reaches the goal".to_owned()),
-        _ => no_plan(false, "the time limit was reached before a plan was found".to_owned()),
+        _ => no_plan(false, "no plan was found within the limits".to_owned()),
     }
 }

@@ -169,7 +169,8 @@ pub struct Settings {
     /// Default: 10 s.
     pub time_limit: Option<Duration>,
     /// Whether to prefer, among optimal plans of equal length, one that shares most steps with the current plan. The
-    /// choice then depends on the history, and not only on the situation.
+    /// choice then depends on the history, and not only on the situation. Has no effect if the incremental planner does
+    /// not support the mission.
     pub stay_close: bool,
     /// Filters for measurements and component reports.
     pub filters: FilterSettings,

@@ -34,13 +34,13 @@ impl fmt::Display for Blocking {
         match self {
             Self::Designs(designs) => write!(
                 f,
-                "unavailable designs are the cause: there is no plan without {}; with all other designs, any one of \
-                 these would be sufficient",
+                "unavailable designs are the cause: there is no plan without {}; with all other designs of the \
+                 knowledge base, any one of these would be sufficient",
                 designs.join(", ")
             ),
-            Self::Other => {
-                f.write_str("designs are not the cause: no plan exists even if all designs are available")
-            }
+            Self::Other => f.write_str(
+                "designs are not the cause: no plan exists even if all designs of the knowledge base are available",
+            ),
         }
     }
 }

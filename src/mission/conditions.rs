@@ -81,13 +81,9 @@ pub fn written(atom: &Atom) -> String {
     format!("({})", words.join(" "))
 }
 
-/// Converts errors to faults with offsets in `text`. The text was parsed on the first line of an
-/// input, after a prefix of `before` characters.
+/// Converts errors to faults with offsets in `text`. The text was parsed on the first line of an input, after a prefix of
+/// `before` characters. A fault in the prefix gets the place of the text's first character.
 fn faults(errors: Errors, text: &str, before: usize) -> Vec<Fault> {
-    // Faults in the prefix are not about the text. A fault at an added opening parenthesis gets the
-    // place of the text's first character.
-    let is_own =
-        |error: &Message| error.line != Some(1) || error.column.is_none_or(|column| column >= before);
     let fault = |error: Message| {
         let offset = error.column.filter(|_| error.line == Some(1)).and_then(|column| {
             let characters = column.saturating_sub(before + 1);
@@ -100,5 +96,5 @@ fn faults(errors: Errors, text: &str, before: usize) -> Vec<Fault> {
         };
         Fault { offset, message }
     };
-    errors.into_iter().filter(is_own).map(fault).collect()
+    errors.into_iter().map(fault).collect()
 }

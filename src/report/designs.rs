@@ -84,10 +84,12 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
     }
     let design = knowledge.catalogue().designs().iter().find(|candidate| candidate.individual.name == design);
     let Some(design) = design else { return Vec::new() };
-    let Causes { causes, are_all_needed } = causes(knowledge, design);
+    let Causes { causes, suffice_together } = causes(knowledge, design);
     let count = causes.len();
-    let introduction = if are_all_needed {
-        format!("{count} causes make the design unavailable, and all of them must be removed:")
+    let introduction = if suffice_together {
+        format!(
+            "{count} causes make the design unavailable; if all of them were removed, it would be available:"
+        )
     } else {
         format!("{count} causes make the design unavailable:")
     };

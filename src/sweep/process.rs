@@ -3,6 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use planner::Limits;
@@ -13,6 +14,9 @@ use super::study::{Planned, Study, shown};
 use crate::message::Message;
 
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
+
+/// Time in which the output of killed processes is read.
+const READ_GRACE: Duration = Duration::from_secs(1);
 
 const MAX_MESSAGE_CHARACTERS: usize = 2000;
 
@@ -128,7 +132,8 @@ struct Ended {
     errors: String,
 }
 
-/// Executes a program in a directory, and kills it once `reached` returns a limit.
+/// Executes a program in a directory. Waits until it has ended and no process that it started holds its output open.
+/// Kills these processes once `reached` returns a limit.
 fn execute(
     program: &Path,
     words: &[String],
@@ -148,12 +153,16 @@ fn execute(
         .stderr(Stdio::piped())
         .spawn()?;
     let (output, errors) = (reader(child.stdout.take()), reader(child.stderr.take()));
-    let status = wait(&mut child, reached)?;
-    Ok(Ended { status, output: output.join().unwrap_or_default(), errors: errors.join().unwrap_or_default() })
+    let status = wait(&mut child, &|| output.is_finished() && errors.is_finished(), reached)?;
+    // A pipe that is still open belongs to a process that could not be killed.
+    let text = |reader: JoinHandle<String>| {
+        if reader.is_finished() { reader.join().unwrap_or_default() } else { String::new() }
+    };
+    Ok(Ended { status, output: text(output), errors: text(errors) })
 }
 
 /// Reads a pipe to its end on a separate thread, because reading two pipes in turn may deadlock.
-fn reader(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<String> {
+fn reader(pipe: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
         if let Some(mut pipe) = pipe {
@@ -167,27 +176,33 @@ fn reader(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<S
 /// Kills a process that leads a process group, and the processes that it has started, such as an external SAT
 /// solver: these would keep the pipes open.
 fn kill(child: &mut Child) -> std::io::Result<()> {
+    // Fails if no process of the group is left.
     #[cfg(unix)]
-    rustix::process::kill_process_group(
+    let _ = rustix::process::kill_process_group(
         rustix::process::Pid::from_child(child),
         rustix::process::Signal::KILL,
-    )?;
+    );
     child.kill()
 }
 
-/// Waits for the end of a process. Returns its exit status. Once `reached` returns a limit, kills the
-/// process and returns the limit.
+/// Waits for the end of a process, and until its output `is_read`. Returns its exit status. Once `reached` returns a
+/// limit, kills the process and returns the limit.
 fn wait(
     child: &mut Child,
+    is_read: &dyn Fn() -> bool,
     reached: &dyn Fn() -> Option<Reached>,
 ) -> std::io::Result<Result<ExitStatus, Reached>> {
     loop {
-        if let Some(status) = child.try_wait()? {
+        if let Some(status) = child.try_wait()?.filter(|_| is_read()) {
             return Ok(Ok(status));
         }
         if let Some(limit) = reached() {
             kill(child)?;
             child.wait()?;
+            let killed = Instant::now();
+            while !is_read() && killed.elapsed() < READ_GRACE {
+                std::thread::sleep(POLL_INTERVAL);
+            }
             return Ok(Err(limit));
         }
         std::thread::sleep(POLL_INTERVAL);

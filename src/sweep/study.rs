@@ -373,8 +373,8 @@ impl Study {
     /// Returns the arguments of a run's command, without the program's name. `directory` replaces `{dir}`. The last
     /// arguments request an answer in JSON without warnings.
     pub fn words(&self, run: &Planned, directory: &Path) -> Vec<String> {
-        let mut words: Vec<String> =
-            self.sections.command.iter().map(|word| filled(word, &run.vary, directory)).collect();
+        let command = self.sections.command.iter();
+        let mut words: Vec<String> = command.map(|word| run.filled(word, directory)).collect();
         let named = self.sections.placeholders();
         for (key, value) in run.vary.iter().filter(|(key, _)| !named.contains(key.as_str())) {
             let several = match value {
@@ -397,7 +397,7 @@ impl Study {
     /// such a program.
     pub fn generator(&self, run: &Planned, directory: &Path) -> Option<Vec<String>> {
         let generate = self.sections.generate.as_ref()?;
-        Some(generate.run.iter().map(|word| filled(word, &run.vary, directory)).collect())
+        Some(generate.run.iter().map(|word| run.filled(word, directory)).collect())
     }
 }
 
@@ -405,10 +405,24 @@ fn placeholders(word: &str) -> impl Iterator<Item = &str> {
     word.split('{').skip(1).filter_map(|rest| rest.split_once('}').map(|(name, _)| name))
 }
 
-fn filled(word: &str, vary: &Map<String, Value>, directory: &Path) -> String {
-    let mut text = word.replace("{dir}", &directory.to_string_lossy());
-    for (key, value) in vary {
-        text = text.replace(&format!("{{{key}}}"), &shown(value));
+impl Planned {
+    fn filled(&self, word: &str, directory: &Path) -> String {
+        filled(word, |name| match name {
+            "dir" => Some(directory.to_string_lossy().into_owned()),
+            key => self.vary.get(key).map(shown),
+        })
+    }
+}
+
+/// Replaces each name in braces for which `value` returns a text. Braces in these texts have no meaning.
+fn filled(word: &str, value: impl Fn(&str) -> Option<String>) -> String {
+    let mut parts = word.split('{');
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        match part.split_once('}').and_then(|(name, end)| Some((value(name)?, end))) {
+            Some((value, end)) => text += &(value + end),
+            None => text.extend(["{", part]),
+        }
     }
     text
 }
@@ -466,18 +480,21 @@ fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
 
 /// Returns a word of the command for all values of its keys in braces. `{dir}` is not replaced, because files in the
 /// directory of a run are not files of the study.
-fn instances(word: &str, keys: &[(String, Vec<Value>)]) -> Vec<String> {
-    let mut words = vec![word.to_owned()];
-    for (key, values) in keys {
-        let placeholder = format!("{{{key}}}");
-        if word.contains(&placeholder) {
-            let filled = |word: &String| {
-                values.iter().map(|value| word.replace(&placeholder, &shown(value))).collect()
-            };
-            words = words.iter().flat_map(|word| -> Vec<String> { filled(word) }).collect();
-        }
-    }
-    words
+fn instances(word: &str, keys: &[(String, Vec<Value>)]) -> impl Iterator<Item = String> {
+    let is_in_word = |key: &str| key != "dir" && placeholders(word).any(|name| name == key);
+    let keys: Vec<_> = keys.iter().filter(|(key, _)| is_in_word(key)).collect();
+    let count: usize = keys.iter().map(|(_, values)| values.len()).product();
+    (0..count).map(move |number| {
+        let mut remaining = number;
+        // The number is a mixed-radix number whose digits select the values.
+        let digits = keys.iter().rev().map(|(key, values)| {
+            let value = &values[remaining % values.len()];
+            remaining /= values.len();
+            (key.as_str(), value)
+        });
+        let chosen: BTreeMap<&str, &Value> = digits.collect();
+        filled(word, |name| chosen.get(name).map(|value| shown(value)))
+    })
 }
 
 fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) -> String {
@@ -491,7 +508,9 @@ fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) 
     part(env!("CARGO_PKG_VERSION").as_bytes());
     part(format!("{:?} {:?} {:?}", sections.command, sections.time_limit, sections.generate).as_bytes());
     part(json!(keys).to_string().as_bytes());
-    for word in sections.command.iter().flat_map(|word| instances(word, keys)) {
+    // An option is not the path of a file.
+    let words = sections.command.iter().filter(|word| !word.starts_with('-'));
+    for word in words.flat_map(|word| instances(word, keys)) {
         let path = directory.join(word);
         let Ok(bytes) = std::fs::read(&path) else { continue };
         part(&bytes);
@@ -535,6 +554,18 @@ mod tests {
         // No run uses this file.
         write("m-2.toml", "a");
         assert_eq!(with, digest());
+    }
+
+    #[test]
+    fn braces_in_values_have_no_meaning() {
+        let text =
+            "command = ['plan', '{a}-{b}{', '{dir}']\n[vary]\na = ['{b}', '{dir}']\nb = ['{a}', 'x']\n";
+        let study = study(text).expect("a study");
+        let words: Vec<String> =
+            study.runs(Shard::default()).map(|run| study.words(&run, Path::new("{a}"))[1].clone()).collect();
+        assert_eq!(words, ["{b}-{a}{", "{b}-x{", "{dir}-{a}{", "{dir}-x{"]);
+        assert_eq!(instances("{a}-{b}{", &study.keys).collect::<Vec<_>>(), words);
+        assert_eq!(study.words(&study.planned(0), Path::new("{a}"))[2], "{a}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Creation of MAPE-K loops for the tests, and delivery of events.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use metaplan::mapek::{Answer, Loop, Observation, Settings};
@@ -49,4 +49,11 @@ fn read(domain: &str, problem: &str, knowledge: &str, sections: &str) -> Loop {
 /// Returns the kinds of the answers.
 pub fn kinds(answers: &[Answer]) -> Vec<String> {
     answers.iter().map(|answer| answer.to_json()["answer"].as_str().expect("a kind").to_owned()).collect()
+}
+
+/// Returns the last segment of the journal in a directory.
+pub fn last_segment(directory: &Path) -> PathBuf {
+    let entries =
+        std::fs::read_dir(directory).expect("a directory").map(|entry| entry.expect("an entry").path());
+    entries.filter(|path| path.to_string_lossy().contains("journal-")).max().expect("a journal")
 }

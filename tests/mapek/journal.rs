@@ -9,7 +9,7 @@ use std::time::Duration;
 use metaplan::journal::{Journal, Policy, Recovery, Sync};
 use metaplan::mapek::{Answer, Effect, Loop};
 
-use crate::common::control;
+use crate::common::{control, last_segment};
 
 pub const POLICY: Policy = Policy { sync: Sync::Never, snapshot_every: 7 };
 
@@ -197,13 +197,6 @@ fn received(pristine: &Loop) -> Vec<BTreeMap<u64, Effect>> {
         effects_by_lines.push(robot.effects.clone());
     }
     effects_by_lines
-}
-
-fn last_segment(directory: &Path) -> std::path::PathBuf {
-    let entries =
-        std::fs::read_dir(directory).expect("a directory").map(|entry| entry.expect("an entry").path());
-    let journals = entries.filter(|path| path.to_string_lossy().contains("journal-"));
-    journals.max().expect("a journal")
 }
 
 #[test]

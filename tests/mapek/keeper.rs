@@ -2,7 +2,7 @@
 //! passing of time.
 
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
@@ -13,6 +13,7 @@ use metaplan::knowledge::Knowledge;
 use metaplan::mapek::{FilterSettings, Recoverable as _};
 use serde_json::{Value, json};
 
+use crate::common::last_segment;
 use crate::configure::{ROBOT, robot, robot_with};
 use crate::faults::temporary_directory;
 
@@ -89,12 +90,6 @@ fn uninterrupted(pristine: &Keeper, lines: &[String]) -> (Vec<Vec<Value>>, Value
         all.push(to_json(&mut keeper, &answers));
     }
     (all, keeper.checkpoint().0, directory)
-}
-
-fn last_segment(directory: &Path) -> PathBuf {
-    let entries =
-        std::fs::read_dir(directory).expect("a directory").map(|entry| entry.expect("an entry").path());
-    entries.filter(|path| path.to_string_lossy().contains("journal-")).max().expect("a journal")
 }
 
 #[test]

@@ -199,3 +199,13 @@ pub fn steps(answer: &Value) -> Vec<String> {
     };
     answer["steps"].as_array().expect("steps").iter().map(step).collect()
 }
+
+/// Returns `true` if this process ignores a signal, as background processes of a shell do. Child processes
+/// inherit this.
+#[cfg(unix)]
+pub fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask >> (signal - 1) & 1 == 1
+}

@@ -8,6 +8,8 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
+#[cfg(unix)]
+use crate::common::is_ignored;
 use crate::common::{Outcome, metaplan, metaplan_in, root};
 
 /// Time limits in seconds, tried in this order. On a busy machine the first limits can end before there is
@@ -53,7 +55,7 @@ fn check(
     };
     let mut interruptions: Vec<Box<dyn Fn(u32) -> Outcome + '_>> = vec![Box::new(by_limit)];
     #[cfg(unix)]
-    if !is_ignored() {
+    if !is_ignored(2) {
         interruptions.push(Box::new(|seconds| interrupted(directory, &[arguments, &json].concat(), seconds)));
     }
     let answers = interruptions.iter().map(|interrupt| {
@@ -72,14 +74,6 @@ fn check(
         assert_eq!(answer["messages"][0]["code"], "M130", "{answer:#}");
     }
     answers
-}
-
-/// Returns `true` if SIGINT is ignored, as in background processes of a shell.
-#[cfg(unix)]
-fn is_ignored() -> bool {
-    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0) & 2 != 0
 }
 
 #[test]

@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::certificate::{certificate, change};
+#[cfg(unix)]
+use crate::common::is_ignored;
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, outcome, root, verifier, verify_in};
 
 /// Waits up to 20 s for the program to end. If it does not end, kills it and returns `None`.
@@ -33,16 +35,6 @@ fn start(arguments: &[&str]) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts")
-}
-
-/// Returns `true` if this process ignores a signal, as background processes of a shell do. Child processes
-/// inherit this.
-#[cfg(unix)]
-fn is_ignored(signal: i32) -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
-    mask >> (signal - 1) & 1 == 1
 }
 
 #[cfg(unix)]

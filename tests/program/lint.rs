@@ -52,6 +52,21 @@ fn templates_and_shipped_missions_are_clean() {
 }
 
 #[test]
+fn impossible_actions_do_not_lead_to_warnings() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let domain = "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (magic) (done)) \
+        (:durative-action jump :parameters () :duration (= ?duration -1) :condition (at start (magic)) \
+        :effect (at end (done))))";
+    std::fs::write(directory.path().join("d.pddl"), domain).expect("written");
+    for (init, status) in [("", 0), ("(magic)", 1)] {
+        let problem = format!("(define (problem p) (:domain d) (:init {init}) (:goal (done)))");
+        std::fs::write(directory.path().join("p.pddl"), problem).expect("written");
+        let outcome = metaplan_in(directory.path(), &["lint", "d.pddl", "p.pddl"], "");
+        assert_eq!((outcome.status, outcome.stdout.contains("M232")), (status, status == 1), "{outcome:#?}");
+    }
+}
+
+#[test]
 fn mistakes_in_the_section_probabilistic_are_errors() {
     let section = "[probabilistic]\nlocation = \"nowhere\"\nbattery_unit = 0\nloss_component = \"c_lidr\"\n\
                    loss_rate = -0.1\n\n[planning]\n";

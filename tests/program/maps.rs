@@ -177,6 +177,18 @@ fn all_errors_of_a_map_are_reported() {
 }
 
 #[test]
+fn names_that_pddl_does_not_allow_are_refused() {
+    let directory = tempfile::tempdir().expect("a directory");
+    for name in ["1", "_a", "a-b", ""] {
+        let outcome = import(directory.path(), &map(), &["--name", name]);
+        assert!(
+            outcome.status == 2 && outcome.stderr.contains("begin with a letter"),
+            "{name}: {outcome:#?}"
+        );
+    }
+}
+
+#[test]
 fn places_are_drawn_at_their_coordinates() {
     let directory = tempfile::tempdir().expect("a directory");
     assert_eq!(import(directory.path(), &map(), &["--speeds", "full", "--battery", "1000000"]).status, 0);

@@ -134,7 +134,8 @@ fn missing_plan_is_stated_plainly() {
 
 #[test]
 fn all_causes_of_an_unavailable_design_are_listed() {
-    let sentence = "2 causes make the design unavailable, and all of them must be removed:";
+    let sentence =
+        "2 causes make the design unavailable; if all of them were removed, it would be available:";
     let kinect = "c_status(c_kinect, &quot;FALSE&quot;) is stated";
     let sun = "hasValue(obs_ambient_light, &quot;0.9&quot;^^decimal) is stated";
     let check = |situation: &[&str], has_kinect: bool, has_sun: bool| {

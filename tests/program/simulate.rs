@@ -324,7 +324,7 @@ fn greedy_control_observes_requirements_in_a_ward() {
             let arguments = line["arguments"].to_string();
             let is_in_rooms = rooms.iter().all(|room| arguments.contains(&format!("\"{room}\"")));
             let is_forbidden =
-                line["action"] == *action && is_in_rooms && line["configuration"][function] == *design;
+                line["name"] == *action && is_in_rooms && line["configuration"][function] == *design;
             assert!(!is_forbidden, "{line}");
         }
     }
@@ -371,7 +371,9 @@ fn events_and_losses_do_not_need_a_working_action() {
          recover = ['c_kinect', 'c_lidar', 'c_camera']\n"
     ));
     assert_eq!(recovered["accomplished"], true, "{recovered:#}");
-    let lost = simulate_stalled("lifeline = 'battery'\n[[event]]\nat = 0.5\nset = {battery = '0'}\n");
+    let lost = simulate_stalled(&format!(
+        "lifeline = 'battery'\n{fail}[[event]]\nat = 0.5\nset = {{battery = '0'}}\n"
+    ));
     assert_eq!(lost["lost"], true, "{lost:#}");
 }
 

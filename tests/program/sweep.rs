@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use metaplan::schemas::schema;
 use metaplan::sweep::Study;
@@ -219,8 +219,17 @@ fn a_failed_generator_does_not_affect_other_runs() {
 #[cfg(unix)]
 fn time_limits_bind_generators() {
     let folder = tempfile::tempdir().expect("a directory");
-    let generate = "[generate]\nrun = ['sh', '-c', 'sleep 1000']\n";
-    let text = format!("command = ['check', '{{dir}}/m.prism', 'Pmax=? [ F s=1 ]']\n{generate}");
+    let study = |generate: &str| {
+        format!("command = ['check', 'm.prism', 'P=? [ F s=1 ]']\n[generate]\nrun = {generate}\n")
+    };
+    // A process in the background keeps the output of the generator open after its end.
+    let begun = Instant::now();
+    let background = study("['sh', '-c', 'sleep 60 &']");
+    let (answer, lines) = lines_of(folder.path(), &format!("time_limit = 1\n{background}"));
+    assert_eq!((&answer["done"], &answer["timed_out"]), (&1.into(), &1.into()), "{lines:#?}");
+    assert!(begun.elapsed() < Duration::from_secs(50), "{lines:#?}");
+    let folder = tempfile::tempdir().expect("a directory");
+    let text = study("['sh', '-c', 'sleep 1000']");
     let (answer, lines) = lines_of(folder.path(), &format!("time_limit = 1\n{text}"));
     assert_eq!((&answer["done"], &answer["timed_out"]), (&1.into(), &1.into()), "{answer:#}");
     assert!(lines[0]["message"].as_str().is_some_and(|text| text.contains("time limit")), "{lines:#?}");

@@ -295,6 +295,9 @@ impl<'m> Numbers<'m> {
         binding: &mut Binding<'a>,
         visit: &mut dyn FnMut(&Binding<'a>),
     ) {
+        if conditions.iter().any(|condition| self.truth(condition, binding) == Some(false)) {
+            return;
+        }
         let Some((variable, r#type)) = variables.get(binding.len()) else { return visit(binding) };
         let objects = self.domain.constants.iter().chain(&self.problem.objects);
         let mut visited = HashSet::new();
@@ -308,9 +311,7 @@ impl<'m> Numbers<'m> {
                 continue;
             }
             binding.push((variable, object.identifier.name.clone()));
-            if conditions.iter().all(|condition| self.truth(condition, binding) != Some(false)) {
-                self.each(variables, conditions, binding, visit);
-            }
+            self.each(variables, conditions, binding, visit);
             binding.pop();
         }
     }
