@@ -13,9 +13,6 @@ use task::plan::{Exact, metric};
 use task::task::Task;
 use testing::{depot, fleet, ground_text, optimum};
 
-use crate::optimize::optimizer_run::{Best, Run};
-use crate::optimize::prover::Prover;
-use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::{Config, Engine, Strategy, optimize};
 
 const STRATEGIES: [Strategy; 3] = [Strategy::Auto, Strategy::Tighten, Strategy::Cores];
@@ -129,26 +126,6 @@ fn check_reasons(seeds: std::ops::Range<u64>) {
 #[test]
 fn the_proof_is_a_bound_exactly_if_the_initial_bound_is_the_optimum() {
     check_reasons(0..12);
-}
-
-/// A core-guided search that is interrupted after its first core has raised the lower bound.
-#[test]
-fn a_raised_bound_has_the_step_bound_of_its_formula() {
-    let mut raised = 0;
-    for (text, task, _) in tasks(0..6) {
-        let plan = optimize(&task, &Config::default(), &mut |_| {}).ground.expect("a plan");
-        let config = config(&Backend::default(), Strategy::Cores, Limits::none());
-        let bounds = Bounds::new(Context::new(&task, &config.limits)).expect("no limit");
-        let interrupt = config.limits.interrupt();
-        let mut stop = |_| interrupt.store(true, Ordering::Relaxed);
-        let mut run = Run::new(&task, &config, &mut stop);
-        let mut best = Best { plan, lower: 0 };
-        let mut prover = Prover::default();
-        let _ = prover.advance(&mut run, &bounds, &mut best, SatBudget::UNLIMITED);
-        assert_eq!(best.lower > 0, prover.step_bound > 0, "{} {}: {text}", best.lower, prover.step_bound);
-        raised += usize::from(best.lower > 0);
-    }
-    assert!(raised > 0);
 }
 
 fn check_anytime(seeds: std::ops::Range<u64>) {
