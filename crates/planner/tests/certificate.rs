@@ -3,7 +3,6 @@
 
 use std::fmt::Write as _;
 
-#[allow(dead_code, reason = "another suite uses the rest")]
 use certificate::{Faithful, check as check_argument, faithful, verification_conditions, witness};
 use metaplan_planner::{Certificate, Config, GroundConfig, Limits, Status, certify, ground, optimize};
 use num_rational::BigRational;

@@ -5,27 +5,13 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use metaplan_planner::{
-    GroundConfig, Limits, Plan, Solution, Status, ground_concurrent, optimize_concurrent,
-};
-use num_bigint::BigInt;
+use metaplan_planner::{GroundConfig, Limits, Solution, Status, ground_concurrent, optimize_concurrent};
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
-use pddl::validate::{Options, PlanText, validate};
-use pddl::{Source, read};
 use testing::random::Random;
 
+use crate::concurrent::{metric, parse, rational, written};
 use crate::tally::with_enough_time;
-
-fn rational(numerator: i128, denominator: i128) -> BigRational {
-    BigRational::new(BigInt::from(numerator), BigInt::from(denominator))
-}
-
-pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
-    let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
-    let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
-    (domain, problem)
-}
 
 /// Plans with chosen durations. The validator checks the plan and its metric.
 pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
@@ -39,31 +25,6 @@ pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limit
         assert_eq!(value, plan.cost.to_rational(), "{text}");
     }
     solution
-}
-
-pub fn written(plan: &Plan) -> String {
-    let mut text = String::new();
-    for step in &plan.steps {
-        let words = [std::slice::from_ref(&step.action), &step.arguments[..]].concat().join(" ");
-        let _ = writeln!(text, "{}: ({words}) [{}]", step.start, step.duration);
-    }
-    text
-}
-
-pub fn metric(
-    domain: &Domain,
-    problem: &Problem,
-    text: &str,
-    separation: &BigRational,
-) -> Result<BigRational, String> {
-    let plan =
-        PlanText::parse(&Source::new("plan", text)).unwrap_or_else(|errors| panic!("{errors:?}\n{text}"));
-    let options = Options::default().with_concurrent(true).with_tolerance(separation.clone());
-    let verdict = validate(domain, problem, &plan, &options);
-    match verdict.violation {
-        None => Ok(verdict.metric.unwrap_or(verdict.total_time)),
-        Some(violation) => Err(violation.message),
-    }
 }
 
 /// Checks status, metric and steps of the solution, with a separation of 1/1000.

@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 use metaplan_planner::{Limits, Status};
 use testing::random::Random;
 
-use crate::concurrent_durations::{metric, parse, solve, written};
+use crate::concurrent::{metric, parse, written};
+use crate::concurrent_durations::solve;
 use crate::tally::with_enough_time;
 use num_bigint::BigInt;
 use num_rational::BigRational;

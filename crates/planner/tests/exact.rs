@@ -14,15 +14,10 @@ use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 use pddl::ast::{Domain, Name, Problem};
 use pddl::validate::{Options, PlanStep, PlanText, validate};
-use pddl::{Source, read};
 use test_resources::data;
 use testing::random::Random;
 
-fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
-    let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
-    let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
-    (domain, problem)
-}
+use crate::concurrent::parse;
 
 fn number(decimal: &str) -> BigRational {
     let (whole, fraction) = decimal.split_once('.').unwrap_or((decimal, ""));

@@ -10,19 +10,15 @@ use metaplan_planner::{
 };
 use num_bigint::BigInt;
 use num_rational::BigRational;
-use pddl::ast::{Direction, Domain, Problem};
-use pddl::{Source, read, read_objective};
+use pddl::ast::Direction;
+use pddl::{Source, read_objective};
+
+use crate::concurrent::parse;
 
 /// A number close to the limit of 2^118 for numbers of a task. `MANY` times this number overflows
 /// 128 bits.
 const LARGE: &str = "330000000000000000000000000000000000";
 const MANY: usize = 520;
-
-fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
-    let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
-    let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
-    (domain, problem)
-}
 
 fn task(domain: &str, problem: &str) -> Task {
     let (domain, problem) = parse(domain, problem);

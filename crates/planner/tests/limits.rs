@@ -10,15 +10,9 @@ use metaplan_planner::{
 };
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
-use pddl::{Source, read};
 
+use crate::concurrent::parse;
 use crate::concurrent_jobs;
-
-fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
-    let (domain, problem, _) =
-        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
-    (domain, problem)
-}
 
 /// A robot transports parcels on a ring of places. Each move needs a design for each of two
 /// functions. Every design suits both functions, but the two designs of a move must differ.
@@ -115,6 +109,76 @@ fn check_overrun(name: &str, (domain, problem): &(Domain, Problem)) {
             assert_ne!(status, Some(Status::Unsolvable), "{name}");
         }
     }
+}
+
+fn names(prefix: &str, count: usize) -> Vec<String> {
+    (0..count).map(|index| format!("{prefix}{index}")).collect()
+}
+
+/// Each conclusion follows from the previous one without any action.
+fn chain(length: usize) -> (Domain, Problem) {
+    let domain = "(define (domain d) (:requirements :adl :derived-predicates)
+      (:predicates (start ?x) (link ?x ?y) (hot ?x) (reached ?x))
+      (:derived (reached ?x) (or (start ?x) (hot ?x) (exists (?y) (and (link ?y ?x) (reached ?y)))))
+      (:action heat :parameters (?x) :effect (hot ?x)))";
+    let objects = names("o", length);
+    let links: String = objects.windows(2).map(|pair| format!("(link {} {})", pair[0], pair[1])).collect();
+    let last = &objects[length - 1];
+    let objects = objects.join(" ");
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects {objects}) (:init (start o0) {links})
+          (:goal (and (reached {last}) (hot o0))))"
+    );
+    parse(domain, &problem)
+}
+
+/// Each derived atom has two rules, so none is replaced by the body of its rule.
+fn alternatives_of_atoms(count: usize) -> (Domain, Problem) {
+    let domain = "(define (domain d) (:requirements :adl :derived-predicates) (:predicates (hot ?x) (lit ?x) (warm ?x))
+      (:derived (warm ?x) (or (hot ?x) (lit ?x)))
+      (:action heat :parameters (?x) :effect (hot ?x))
+      (:action light :parameters (?x) :effect (lit ?x)))";
+    let objects = names("o", count).join(" ");
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects {objects}) (:init) (:goal (forall (?x) (warm ?x))))"
+    );
+    parse(domain, &problem)
+}
+
+/// About half of the pairs of designs are forbidden.
+fn forbidden_pairs(designs: usize) -> (Domain, Problem) {
+    let domain = "(define (domain d) (:requirements :typing :fluents) (:types design function)
+      (:constants f1 f2 - function)
+      (:predicates (done) (fd_solve_f ?d - design ?f - function)) (:functions (use ?d - design))
+      (:action work :parameters (?c ?d - design)
+        :precondition (and (fd_solve_f ?c f1) (fd_solve_f ?d f2) (<= (+ (use ?c) (use ?d)) 1000)) :effect (done)))";
+    let designs = names("d", designs);
+    let each = |(index, name): (usize, &String)| {
+        let amount = index * 1_000 / designs.len();
+        format!("(fd_solve_f {name} f1) (fd_solve_f {name} f2) (= (use {name}) {amount})")
+    };
+    let init: String = designs.iter().enumerate().map(each).collect();
+    let objects = designs.join(" ");
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects {objects} - design) (:init {init}) (:goal (done)))"
+    );
+    parse(domain, &problem)
+}
+
+/// With a quadratic number of steps, the chain takes more than five minutes.
+#[test]
+fn grounding_does_not_take_quadratic_time() {
+    let check = |name: &str, (domain, problem): (Domain, Problem)| {
+        let started = Instant::now();
+        let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+        let passed = started.elapsed();
+        println!("{name}: {passed:.1?}");
+        assert!(task.unreachable().is_none());
+        assert!(passed < Duration::from_secs(60), "{name}: {passed:?}");
+    };
+    check("a chain of conclusions", chain(40_000));
+    check("derived atoms with two rules", alternatives_of_atoms(60_000));
+    check("forbidden pairs of designs", forbidden_pairs(700));
 }
 
 /// The first node has as many successors as there are switches.

@@ -115,14 +115,7 @@ impl Mission {
 
     fn task(&self, objectives: &[&str], reversed: bool) -> Task {
         let (domain, problem) = self.text(reversed);
-        let sources = (Source::new("domain", &domain), Source::new("problem", &problem));
-        let (domain, problem, _) = read(&sources.0, &sources.1).expect("PDDL");
-        let objective = |text: &&str| -> Metric {
-            let source = Source::new("objective", *text);
-            read_objective(Direction::Minimize, &source, &domain, &problem).expect("an objective")
-        };
-        let objectives = objectives.iter().map(objective).collect();
-        ground(&domain, &problem, &GroundConfig::default().with_objectives(objectives)).expect("a task")
+        task(&domain, &problem, objectives)
     }
 
     fn way(plan: &Plan, reversed: bool) -> (Vec<usize>, Vec<[usize; 2]>) {
@@ -138,6 +131,17 @@ impl Mission {
         }
         (stations, designs)
     }
+}
+
+fn task(domain: &str, problem: &str, objectives: &[&str]) -> Task {
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let objective = |text: &&str| -> Metric {
+        let source = Source::new("objective", *text);
+        read_objective(Direction::Minimize, &source, &domain, &problem).expect("an objective")
+    };
+    let objectives = objectives.iter().map(objective).collect();
+    ground(&domain, &problem, &GroundConfig::default().with_objectives(objectives)).expect("a task")
 }
 
 fn changes(designs: &[[usize; 2]]) -> usize {
@@ -178,6 +182,25 @@ fn lists_of_objectives_are_in_order() {
         let expected = best.map(|way| (way.energy as f64, way.time as f64));
         assert_eq!(found, expected, "seed {seed}: {mission:?}");
     }
+}
+
+#[test]
+fn the_displayed_plan_has_the_values_of_all_objectives() {
+    // An earlier start keeps the first value, but not the second.
+    let domain = "(define (domain d) (:requirements :timed-initial-literals :fluents :conditional-effects)
+      (:predicates (night) (done)) (:functions (effort) (bill))
+      (:action use :parameters () :precondition (and)
+        :effect (and (done) (increase (effort) 1) (when (night) (increase (bill) 1))
+          (when (not (night)) (increase (bill) 10)))))";
+    let problem =
+        "(define (problem p) (:domain d) (:init (at 10 (night)) (= (effort) 0) (= (bill) 0)) (:goal (done)))";
+    let point =
+        lexicographic(&task(domain, problem, &["(effort)", "(bill)"]), &Config::default(), &mut |_| {});
+    let values: Vec<String> = point.values.iter().map(ToString::to_string).collect();
+    assert_eq!((point.solution.status, values), (Status::Optimal, vec!["1".to_owned(), "1".to_owned()]));
+    let starts: Vec<String> =
+        point.solution.plan.iter().flat_map(|plan| &plan.steps).map(|step| step.start.to_string()).collect();
+    assert_eq!(starts, ["10.001"]);
 }
 
 #[test]

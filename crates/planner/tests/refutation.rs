@@ -2,7 +2,6 @@
 //! one, unless it would need too many steps or the cost is not positive. Changed formulas and
 //! legends and wrong proofs are rejected.
 
-#[allow(dead_code, reason = "another suite uses the rest")]
 use std::cell::RefCell;
 use std::io::Write;
 use std::rc::Rc;

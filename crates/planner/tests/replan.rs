@@ -14,16 +14,11 @@ use metaplan_planner::{
 use num_rational::BigRational;
 use pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
 use pddl::validate::metric_after;
-use pddl::{Source, read};
 use test_resources::{data, python};
 use testing::missions::Mission;
 use testing::random::Random;
 
-fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
-    let sources = (Source::new("domain", domain), Source::new("problem", problem));
-    let (domain, problem, _) = read(&sources.0, &sources.1).expect("PDDL");
-    (domain, problem)
-}
+use crate::concurrent::parse;
 
 fn atom(words: &str) -> Atom {
     let mut words = words.split(' ').map(|word| Identifier { name: Name::new(word), span: Span::default() });

@@ -112,6 +112,63 @@ fn proofs_name_their_reason() {
     assert_eq!(optimize(&task, &within, &mut |_| {}).status, Status::UnsolvableWithinHorizon);
 }
 
+fn reason(domain: &str, problem: &str) -> String {
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    let solution = optimize(&task, &Config::default(), &mut |_| {});
+    let Some(Proof::Relaxation(reason)) = solution.proof else { panic!("{solution:?}") };
+    assert_eq!(solution.status, Status::Unsolvable);
+    reason
+}
+
+#[test]
+fn unsolvability_has_the_reason_that_applies() {
+    let problem = |init: &str, goal: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:objects a b c - place) (:init (at a) {init}) (:goal {goal}))"
+        )
+    };
+    // The path from a to c consumes two units of fuel.
+    let domain = "(define (domain d) (:types place) (:predicates (at ?p - place) (way ?a ?b - place)) (:functions (fuel))
+      (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b) (>= (fuel) 1))
+        :effect (and (not (at ?a)) (at ?b) (decrease (fuel) 1))))";
+    let by_fuel = reason(domain, &problem("(way a b) (way b c) (= (fuel) 1)", "(at c)"));
+    assert!(by_fuel.contains("fuel") && !by_fuel.contains("no path"), "{by_fuel}");
+    let by_goal = reason(domain, &problem("(way a b) (= (fuel) 1)", "(and (at a) (not (at a)))"));
+    assert!(by_goal.contains("contradicts itself"), "{by_goal}");
+}
+
+#[test]
+fn an_unknown_result_names_no_limit_that_was_not_reached() {
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects a b c - place)
+          (:init (at a) (= (total-cost) 0) (= (reward) 0) (= (fuel) 2) {WAYS}) (:goal (at c)) {COST})"
+    );
+    let (domain, problem, _) =
+        read(&Source::new("domain", DOMAIN), &Source::new("problem", problem)).expect("PDDL");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    let backend = Backend::Program { command: "/no/such/solver".to_owned(), arguments: Vec::new() };
+    let config = Config::default().with_engine(Engine::Sat).with_backend(backend);
+    let solution = optimize(&task, &config, &mut |_| {});
+    assert_eq!(solution.status, Status::Unknown);
+    assert!(solution.statistics.failure.is_some() && !solution.verdict().contains("limit"), "{solution}");
+}
+
+/// The number of steps of a formula that does not depend on the bounds is the cost divided by the least cost.
+#[test]
+fn a_confirmation_with_too_many_steps_is_not_attempted() {
+    let domain = "(define (domain d) (:predicates (p) (q)) (:functions (total-cost))
+      (:action far :parameters () :effect (and (p) (increase (total-cost) 1000000000000)))
+      (:action near :parameters () :effect (and (q) (increase (total-cost) 1))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0)) (:goal (and (p) (q))) (:metric minimize (total-cost)))";
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    let solution = optimize(&task, &Config::default().with_confirmation(true), &mut |_| {});
+    assert_eq!((solution.status, solution.proof), (Status::Optimal, Some(Proof::Bound)));
+}
+
 /// Simultaneous contradictory changes of a number make an action inapplicable, as in the validator.
 #[test]
 fn contradictory_changes_leave_an_action_inapplicable() {

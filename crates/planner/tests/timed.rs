@@ -5,16 +5,12 @@ use std::fmt::Write as _;
 
 use metaplan_planner::{Config, Engine, GroundConfig, Limits, Plan, Status, ground, optimize};
 use num_rational::BigRational;
+use pddl::Source;
 use pddl::ast::{Domain, Problem};
 use pddl::validate::{Options, PlanText, validate};
-use pddl::{Source, read};
 use testing::random::Random;
 
-fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
-    let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
-    let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
-    (domain, problem)
-}
+use crate::concurrent::{parse, written};
 
 /// Returns the best plan, if there is one. With `Engine::Sat`, only the SAT solver is used, up to horizon
 /// 8.
@@ -32,16 +28,6 @@ fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
         Status::Optimal | Status::Feasible => solution.plan,
         _ => None,
     }
-}
-
-fn written(plan: &Plan) -> String {
-    let mut text = String::new();
-    for step in &plan.steps {
-        let mut words = step.arguments.clone();
-        words.insert(0, step.action.clone());
-        let _ = writeln!(text, "{}: ({}) [{}]", step.start, words.join(" "), step.duration);
-    }
-    text
 }
 
 fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
@@ -119,6 +105,20 @@ fn actions_wait_for_timed_literals() {
         "(and (inspected) (recorded))",
         Some(("9", &["0", "5", "18.001"])),
     );
+}
+
+#[test]
+fn an_action_keeps_its_start_if_an_earlier_one_costs_more() {
+    // The rate is 1 at night and 10 before. Operator costs do not include it, because it is read from the state.
+    let domain =
+        "(define (domain rental) (:requirements :timed-initial-literals :fluents :conditional-effects)
+      (:predicates (night) (ready) (done)) (:functions (rate) (bill))
+      (:action prepare :parameters () :precondition (and)
+        :effect (and (ready) (when (night) (assign (rate) 1)) (when (not (night)) (assign (rate) 10))))
+      (:action use :parameters () :precondition (ready) :effect (and (done) (increase (bill) (rate)))))";
+    let problem = "(define (problem p) (:domain rental) (:init (at 10 (night)) (= (rate) 0) (= (bill) 0))
+      (:goal (done)) (:metric minimize (bill)))";
+    check("night", domain, problem, Some(("1", &["10.001", "10.001"])));
 }
 
 fn literal(random: &mut Random) -> String {

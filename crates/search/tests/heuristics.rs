@@ -63,6 +63,19 @@ fn a_projection_that_proves_the_goal_unreachable_is_kept() {
 }
 
 #[test]
+fn a_table_of_operators_and_steps_counts_as_memory() {
+    let task = ground_text(depot(0));
+    let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
+    let steps = 1_000;
+    let size = steps * task.operators.len();
+    for (room, fits) in [(size, true), (size - 1, false)] {
+        let limits = Limits::none().with_room(room);
+        let window = bounds.window(Context::new(&task, &limits), None, Some(steps));
+        assert_eq!(window.is_ok(), fits, "{room} bytes");
+    }
+}
+
+#[test]
 #[ignore = "takes minutes"]
 fn many_heuristic_values_are_consistent() {
     for seed in 12..600 {

@@ -83,3 +83,16 @@ fn improved_plans_are_executable_and_cheaper() {
         assert!(cheaper >= 5 && optimal >= 5, "{name}: {cheaper} cheaper plans, {optimal} optimal plans");
     }
 }
+
+/// The plan claims a cost of 0, so no segment can be replaced.
+#[test]
+fn segments_that_cannot_be_replaced_are_not_searched_forever() {
+    let task = ground_text(depot(0));
+    let limits = Limits::none();
+    let plan = random_plan(&task, &mut Random(1)).expect("a plan");
+    let plan = GroundPlan { cost: 0, ..plan };
+    let mut satisficer =
+        Satisficer::new(Context::new(&task, &limits)).expect("no limit").expect("few designs");
+    assert_eq!(satisficer.improve(&plan, &mut (10 * WORK)), Ok(None));
+    assert!(!satisficer.can_improve(), "the search has not ended");
+}

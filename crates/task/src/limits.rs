@@ -19,7 +19,8 @@ pub struct Limits {
     deadline: Option<Instant>,
     time: Duration,
     interrupt: Arc<AtomicBool>,
-    outer: Option<Arc<AtomicBool>>,
+    /// Flags of the computations that this one is a part of.
+    outer: Vec<Arc<AtomicBool>>,
     room: Option<usize>,
     thresholds: Thresholds,
 }
@@ -104,16 +105,17 @@ impl Limits {
         self.room.unwrap_or(DEFAULT_MEMORY)
     }
 
-    /// Returns limits for a part of a computation, with a new interrupt flag that ends only this part. The flag
-    /// of `self` also ends the part.
+    /// Returns limits for a part of a computation, with a new interrupt flag that ends only this part. All flags
+    /// that end the computation of `self` also end the part.
     #[must_use]
     pub fn with_own_interrupt(&self) -> Self {
-        Self { interrupt: Arc::default(), outer: Some(Arc::clone(&self.interrupt)), ..self.clone() }
+        let mut part = self.clone();
+        part.outer.push(std::mem::take(&mut part.interrupt));
+        part
     }
 
     fn is_interrupted(&self) -> bool {
-        let outer = self.outer.as_ref();
-        self.interrupt.load(Ordering::Relaxed) || outer.is_some_and(|flag| flag.load(Ordering::Relaxed))
+        self.outer.iter().chain([&self.interrupt]).any(|flag| flag.load(Ordering::Relaxed))
     }
 
     /// Returns the interrupt flag of these limits. Setting it to `true` interrupts the computations that use
@@ -260,6 +262,8 @@ mod tests {
         assert!(!other_part.reached());
         whole.interrupt().store(true, Ordering::Relaxed);
         assert!(other_part.reached() && other_part.pulse().beat().is_err());
+        let nested = whole.with_own_interrupt().with_own_interrupt();
+        assert!(nested.reached());
     }
 
     #[test]

@@ -235,7 +235,7 @@ fn exact_cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Rational {
 fn limit(task: &mut Task, objective: usize, budget: Int) {
     let variable = NumericId::of(task.initial.numbers.len());
     task.initial.numbers.push(budget);
-    task.number_names.push(String::new());
+    task.number_names.push("the budget of another objective".to_owned());
     let always = task.operators.iter().all(|operator| cost(operator, objective).minimum() >= 0);
     for operator in &mut task.operators {
         let cost = cost(operator, objective).clone();

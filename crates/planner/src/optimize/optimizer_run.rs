@@ -52,6 +52,7 @@ impl FormulaScope {
     }
 }
 
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum StrategyOutcome {
     /// The formula has no plan that is within its cost limit and cheaper than the best known plan.
     Exhausted,

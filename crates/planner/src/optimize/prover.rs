@@ -69,10 +69,17 @@ impl Prover {
             if extent.size() > allowance.clauses {
                 return ProverOutcome::Paused;
             }
-            match (within(run, bounds, &extent, best, allowance), extent.step_bound) {
+            let lower = best.lower;
+            let outcome = within(run, bounds, &extent, best, allowance);
+            if outcome == StrategyOutcome::Exhausted && extent.step_bound.is_some() {
+                best.lower = best.plan.cost.min(limit.saturating_add(1));
+            }
+            // An interrupted core-guided search may also have raised the lower bound.
+            if best.lower > lower {
+                self.step_bound = extent.step_bound.unwrap_or(self.step_bound);
+            }
+            match (outcome, extent.step_bound) {
                 (StrategyOutcome::Exhausted, Some(step_bound)) => {
-                    best.lower = best.plan.cost.min(limit.saturating_add(1));
-                    self.step_bound = step_bound;
                     if best.lower == best.plan.cost {
                         self.horizon = horizon;
                         return ProverOutcome::Proved(Proof::Sat { step_bound });

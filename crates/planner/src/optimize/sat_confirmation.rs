@@ -82,14 +82,15 @@ pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPl
 /// Confirms with the SAT solver that a plan whose cost equals the lower bound is optimal. The formula is
 /// independent of the bounds: its number of steps follows from the cheapest operator. Returns `None` if optimality
 /// is not confirmed. Confirmation is not attempted if an operator costs nothing, if the engine is
-/// [`Engine::Search`], or if the formula would be large and confirmation is not configured.
+/// [`Engine::Search`], if the formula would be large and confirmation is not configured, or if it would be too large.
 fn confirm(run: &mut Run<'_>, incumbent: &GroundPlan) -> Option<Proof> {
     let cheapest =
         run.task.operators.iter().map(|operator| operator.cost.minimum()).min().filter(|c| *c > 0)?;
     let limit = incumbent.below();
     let steps = usize::try_from(limit.checked_div(cheapest)?).ok()?;
-    let is_large = steps.saturating_mul(run.task.operators.len()) > CONFIRM_LIMIT || limit >= CONFIRM_COST;
-    if run.config.engine == Engine::Search || is_large && !run.config.confirm {
+    let size = steps.saturating_mul(run.task.operators.len());
+    let is_large = size > CONFIRM_LIMIT || limit >= CONFIRM_COST;
+    if run.config.engine == Engine::Search || is_large && !run.config.confirm || size > FORMULA_LIMIT {
         return None;
     }
     let allowance = if run.config.confirm { SatBudget::UNLIMITED } else { CONFIRM_BUDGET };

@@ -22,8 +22,8 @@ pub(super) fn solve(mut run: Run<'_>) -> Solution {
         return run.finish(Status::Unknown, None, None, 0, None);
     };
     let Some(lower) = bounds.estimate(&run.task.initial) else {
-        let reason = "no path leads to the goal in a projection of the task to one or two of its variables";
-        return run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Relaxation(reason.into())));
+        let reason = bounds.dead_end_reason(run.task, &run.task.initial);
+        return run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Relaxation(reason)));
     };
     run.statistics.search = started.elapsed();
     match (run.config.engine, run.config.horizon) {

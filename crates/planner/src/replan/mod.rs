@@ -104,7 +104,7 @@ impl Replanner {
             return ReplanOutcome::Misfit;
         };
         let Ok(set) = self.set(&situation.available, query.limits) else {
-            let Ok(task) = base.masked(&situation.available, &Limits::none()) else {
+            let Ok(task) = base.masked(&situation.available, &query.limits.extended()) else {
                 return ReplanOutcome::Unknown;
             };
             return solve::reuse_previous_plan(&base, &task, &situation, query);

@@ -9,6 +9,7 @@
 
 use rustc_hash::FxHashMap;
 
+use task::lists::Lists;
 use task::number::{Int, dense};
 use task::task::{Condition, Fact, Literal, Task};
 
@@ -16,42 +17,6 @@ use task::task::{Condition, Fact, Literal, Task};
 const COST_LIMIT: Int = 1 << 40;
 pub(super) const ALWAYS: u32 = 0;
 pub(super) const GOAL: u32 = 1;
-
-#[derive(Default)]
-pub(super) struct Lists {
-    ends: Vec<u32>,
-    all: Vec<u32>,
-}
-
-impl Lists {
-    fn push(&mut self, list: impl IntoIterator<Item = u32>) {
-        self.all.extend(list);
-        self.ends.push(dense(self.all.len()));
-    }
-
-    fn inverse(&self, count: usize) -> Self {
-        let mut positions: Vec<Vec<u32>> = vec![Vec::new(); count];
-        for list in 0..dense(self.ends.len()) {
-            for item in self.list(list) {
-                positions[*item as usize].push(list);
-            }
-        }
-        let mut inverse = Self::default();
-        for list in positions {
-            inverse.push(list);
-        }
-        inverse
-    }
-
-    pub(super) fn list(&self, position: u32) -> &[u32] {
-        let begin = position.checked_sub(1).map_or(0, |before| self.ends[before as usize]);
-        &self.all[begin as usize..self.ends[position as usize] as usize]
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.ends.len()
-    }
-}
 
 pub(super) struct DeleteRelaxation {
     /// Cost of each payer. The payer of a rule is its operator. The last payer has no cost and pays
@@ -107,7 +72,7 @@ impl DeleteRelaxation {
         }
         let mut rules_of = Lists::default();
         for rules in rules_by_payer {
-            rules_of.push(rules);
+            rules_of.push(&rules);
         }
         let (required_by, given_by) = (required.inverse(facts as usize), given.inverse(facts as usize));
         Some(Self {
@@ -124,7 +89,7 @@ impl DeleteRelaxation {
     }
 
     pub(super) fn facts(&self) -> usize {
-        self.required_by.len()
+        self.required_by.count()
     }
 
     /// Returns the number of a fact of a basic variable.
@@ -138,21 +103,21 @@ impl DeleteRelaxation {
     pub(super) fn reachable_without(&self, values: &[u32], excluded: Option<u32>) -> (Vec<bool>, u64) {
         let mut reachable = vec![false; self.facts()];
         let mut unreached: Vec<u32> =
-            (0..dense(self.payers.len())).map(|rule| dense(self.required.list(rule).len())).collect();
+            (0..dense(self.payers.len())).map(|rule| dense(self.required.of(rule).len())).collect();
         let mut visits = unreached.len() as u64;
         let mut open: Vec<u32> = self.state(values).filter(|fact| Some(*fact) != excluded).collect();
         for fact in &open {
             reachable[*fact as usize] = true;
         }
         while let Some(fact) = open.pop() {
-            for rule in self.required_by.list(fact) {
+            for rule in self.required_by.of(fact) {
                 visits = visits.saturating_add(1);
                 let count = &mut unreached[*rule as usize];
                 *count = count.saturating_sub(1);
                 if *count > 0 {
                     continue;
                 }
-                for given in self.given.list(*rule) {
+                for given in self.given.of(*rule) {
                     if Some(*given) != excluded && !std::mem::replace(&mut reachable[*given as usize], true) {
                         open.push(*given);
                     }
@@ -256,8 +221,8 @@ impl<'a> Builder<'a> {
         given.retain(|fact| *fact != ALWAYS && required.binary_search(fact).is_err());
         if !given.is_empty() {
             self.payers.push(payer);
-            self.required.push(required);
-            self.given.push(given);
+            self.required.push(&required);
+            self.given.push(&given);
         }
     }
 }

@@ -71,7 +71,7 @@ impl LandmarkCut {
     pub(crate) fn new(task: &Task) -> Option<Self> {
         let relaxed = DeleteRelaxation::new(task)?;
         let (facts, rules) = (relaxed.facts(), relaxed.payers.len());
-        let length = |rule: u32| dense(relaxed.required.list(rule).len());
+        let length = |rule: u32| dense(relaxed.required.of(rule).len());
         let lengths: Vec<u32> = (0..dense(rules)).map(length).collect();
         Some(Self {
             costs: relaxed.costs.clone(),
@@ -135,7 +135,7 @@ impl LandmarkCut {
             if value > self.values[fact as usize] {
                 continue;
             }
-            let rules = self.relaxed.required_by.list(fact);
+            let rules = self.relaxed.required_by.of(fact);
             self.work += 2 + rules.len() as u64;
             for rule in rules {
                 let unreached = &mut self.left[*rule as usize];
@@ -146,7 +146,7 @@ impl LandmarkCut {
                     self.supporters[*rule as usize] = fact;
                     self.supports[*rule as usize] = value;
                     let total = value + self.costs[self.relaxed.payers[*rule as usize] as usize];
-                    offer(self.relaxed.given.list(*rule), total, &mut self.values, &mut self.queue);
+                    offer(self.relaxed.given.of(*rule), total, &mut self.values, &mut self.queue);
                 }
             }
         }
@@ -156,7 +156,7 @@ impl LandmarkCut {
         self.zones[GOAL as usize] = CutSide::Goal;
         self.stack.push(GOAL);
         while let Some(fact) = self.stack.pop() {
-            let rules = self.relaxed.given_by.list(fact);
+            let rules = self.relaxed.given_by.of(fact);
             self.work += rules.len() as u64;
             for rule in rules {
                 let supporter = self.supporters[*rule as usize];
@@ -182,13 +182,13 @@ impl LandmarkCut {
             self.stack.push(fact);
         }
         while let Some(fact) = self.stack.pop() {
-            let rules = self.relaxed.required_by.list(fact);
+            let rules = self.relaxed.required_by.of(fact);
             self.work += rules.len() as u64;
             for rule in rules {
                 if self.supporters[*rule as usize] != fact {
                     continue;
                 }
-                let given = self.relaxed.given.list(*rule);
+                let given = self.relaxed.given.of(*rule);
                 if given.iter().any(|fact| self.zones[*fact as usize] == CutSide::Goal) {
                     let payer = self.relaxed.payers[*rule as usize];
                     if !std::mem::replace(&mut self.in_cut[payer as usize], true) {
@@ -215,10 +215,10 @@ impl LandmarkCut {
     /// Updates the h^max values incrementally after the costs of the cut have decreased.
     fn lower(&mut self) {
         for payer in &self.cut {
-            for rule in self.relaxed.rules_of.list(*payer) {
+            for rule in self.relaxed.rules_of.of(*payer) {
                 if self.supporters[*rule as usize] != NONE {
                     let total = self.supports[*rule as usize] + self.costs[*payer as usize];
-                    offer(self.relaxed.given.list(*rule), total, &mut self.values, &mut self.queue);
+                    offer(self.relaxed.given.of(*rule), total, &mut self.values, &mut self.queue);
                 }
             }
         }
@@ -226,14 +226,14 @@ impl LandmarkCut {
             if value > self.values[fact as usize] {
                 continue;
             }
-            let rules = self.relaxed.required_by.list(fact);
+            let rules = self.relaxed.required_by.of(fact);
             self.work += 2 + rules.len() as u64;
             for rule in rules {
                 // Only rules whose supporter became cheaper can change.
                 if self.supporters[*rule as usize] != fact || self.supports[*rule as usize] <= value {
                     continue;
                 }
-                let required = self.relaxed.required.list(*rule);
+                let required = self.relaxed.required.of(*rule);
                 let values = &self.values;
                 let costliest = required.iter().copied().max_by_key(|fact| values[*fact as usize]);
                 let supporter = costliest.unwrap_or(ALWAYS);
@@ -243,7 +243,7 @@ impl LandmarkCut {
                 if values[supporter as usize] < before {
                     let cost = self.costs[self.relaxed.payers[*rule as usize] as usize];
                     let total = values[supporter as usize] + cost;
-                    offer(self.relaxed.given.list(*rule), total, &mut self.values, &mut self.queue);
+                    offer(self.relaxed.given.of(*rule), total, &mut self.values, &mut self.queue);
                 }
             }
         }

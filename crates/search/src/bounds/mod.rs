@@ -34,7 +34,7 @@ use task::context::Context;
 use task::limits::Interrupted;
 use task::number::Int;
 use task::task::quantity::NumericId;
-use task::task::{State, VariableId};
+use task::task::{State, Task, VariableId};
 
 /// Upper bounds on the number of steps are used only if they are below this number.
 const STEP_LIMIT: usize = 4_000;
@@ -139,8 +139,23 @@ impl Bounds {
     /// `None` if the goal is proved unreachable from the state.
     pub fn estimate(&self, state: &State) -> Option<Int> {
         let cost = self.cost_estimate(state)?;
-        let enough = |resource: &Resource| resource.has_enough_resources(state, &self.projections);
-        self.resources.iter().all(enough).then_some(cost)
+        self.missing_resource(state).is_none().then_some(cost)
+    }
+
+    fn missing_resource(&self, state: &State) -> Option<&Resource> {
+        self.resources.iter().find(|resource| !resource.has_enough_resources(state, &self.projections))
+    }
+
+    /// Returns the reason why the goal is unreachable from a state for which [`Bounds::estimate`] is `None`.
+    pub fn dead_end_reason(&self, task: &Task, state: &State) -> String {
+        let missing = self.missing_resource(state).filter(|_| self.cost_estimate(state).is_some());
+        let name = missing.and_then(|resource| task.number_names.get(resource.variable.index()));
+        let projection = "in a projection of the task to one or two of its variables";
+        match name {
+            None => format!("no path leads to the goal {projection}"),
+            // A path to an action that may increase the resource would suffice, but needs too much of it as well.
+            Some(name) => format!("each path to the goal {projection} needs more of {name} than there is"),
+        }
     }
 
     /// Like [`Bounds::estimate`], but ignores resources. Depends only on the finite-domain
@@ -194,7 +209,8 @@ impl Bounds {
     /// and `horizon` are `None` if cost or steps are not limited.
     ///
     /// # Errors
-    /// Fails if the deadline has passed or the interrupt flag is set.
+    /// Fails if the deadline has passed, the interrupt flag is set, or the table of operators and steps would exceed the
+    /// memory limit.
     pub fn window(
         &self,
         context: Context<'_>,
@@ -213,7 +229,11 @@ impl Bounds {
             (Some(a), Some(b)) => a.min(b),
             (a, b) => a.or(b).unwrap_or(0),
         };
-        let mut allowed = vec![vec![true; context.task.operators.len()]; length];
+        let operators = context.task.operators.len();
+        if length.saturating_mul(operators) > context.limits.room() {
+            return Err(Interrupted);
+        }
+        let mut allowed = vec![vec![true; operators]; length];
         for projection in &self.projections {
             projection.restrict(limit, &mut allowed, context.limits)?;
         }

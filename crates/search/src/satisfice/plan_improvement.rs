@@ -123,6 +123,8 @@ impl<N: TaskNumber> PlanImprovement<N> {
                     if let Some(plan) = self.adopt(context, &part.steps) {
                         return Ok(Some(plan));
                     }
+                    // Another search of the segment would return the same steps.
+                    self.end_segment(MAX_DOUBLINGS);
                 }
                 Outcome::Exhausted => self.end_segment(MAX_DOUBLINGS),
                 Outcome::Paused if segment.work == 0 || is_large => self.end_segment(self.doublings),
@@ -135,7 +137,7 @@ impl<N: TaskNumber> PlanImprovement<N> {
     /// Replaces the steps of the current segment by `part`. Returns `None` if this is not a cheaper
     /// plan.
     fn adopt(&mut self, context: &SearchContext<'_, N>, part: &[GroundStep]) -> Option<GroundPlan<N>> {
-        let segment = self.current.take()?;
+        let segment = self.current.as_ref()?;
         let (before, after) = (&self.plan.steps[..self.next], &self.plan.steps[segment.end..]);
         let steps: Vec<GroundStep> = before.iter().chain(part).chain(after).cloned().collect();
         let states = pass(context.task, &context.task.initial, &steps)?;

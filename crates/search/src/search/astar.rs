@@ -30,7 +30,7 @@ use crate::search::heuristic::{Heuristic, LazyHeuristic};
 use crate::search::monotonicity::{Polarity, directions};
 use crate::search::open_list::OpenList;
 use crate::search::search_task::SearchTask;
-use crate::search::state_registry::{NONE, ParentLink, StateRegistry};
+use crate::search::state_registry::{MAX_NODES, NONE, ParentLink, StateRegistry};
 use crate::search::statistics::SearchStatistics;
 use crate::search::stubborn_sets::StubbornSetPruning;
 use crate::search::symmetry::Orbits;
@@ -424,7 +424,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
     fn has_memory(&self) -> bool {
         let improving = self.improving_heuristic.as_ref();
         let shared = improving.map_or(0, |heuristic| heuristic.borrow().bytes());
-        self.store.bytes().saturating_add(self.open.bytes()).saturating_add(shared) <= self.room()
+        let bytes = self.store.bytes().saturating_add(self.open.bytes()).saturating_add(shared);
+        bytes <= self.room() && self.store.len() < MAX_NODES
     }
 
     /// Returns `false` if the lower bound is not expected to reach the upper bound on the plan cost

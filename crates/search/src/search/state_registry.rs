@@ -40,6 +40,10 @@ struct ComparedVariable {
 /// Bit that marks an entry of `fronts` as an index in `trees` instead of the index of a node.
 const TREE_FLAG: u32 = 1 << 31;
 
+/// Number of nodes at which a search must end. Indices of nodes must be below `TREE_FLAG`. The other half of them is
+/// left for the successors of the last expanded state.
+pub(super) const MAX_NODES: usize = TREE_FLAG as usize / 2;
+
 /// Interned numbers: equal numbers have equal indices.
 struct Numbers<N> {
     all: Vec<N>,

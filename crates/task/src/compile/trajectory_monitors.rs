@@ -37,8 +37,6 @@ pub(super) struct Monitors<'t> {
     pub(super) moments: Vec<(String, BigRational)>,
     pub(super) course: PlanSemantics<'t>,
     pub(super) deadlines: Vec<(Deadline, [Condition; 2], Effect)>,
-    /// `true` if an action gets the precondition that its duration is positive (see [`Monitors::separate`]).
-    narrows: bool,
     instances: usize,
     fresh: u64,
 }
@@ -70,7 +68,6 @@ impl<'t> Monitors<'t> {
             moments: Vec::new(),
             course,
             deadlines: Vec::new(),
-            narrows: false,
             instances: 0,
             fresh: 0,
         }
@@ -244,7 +241,6 @@ impl<'t> Monitors<'t> {
                 unsupported(construct, "a duration that is known to be above 0", place)
             })?;
             additions[0].conditions.push(takes_time);
-            self.narrows = true;
         }
         Ok(())
     }
@@ -261,7 +257,7 @@ impl<'t> Monitors<'t> {
                     effect => matches!(effect, Effect::Add(_)),
                 })
         };
-        !self.narrows && self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
+        self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
     }
 
     pub(super) fn can_be_watched(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {

@@ -66,32 +66,57 @@ fn retain<T>(
     outcome
 }
 
+/// Replaces constant derived atoms by their truth values. In each round, only the rules that read an atom of the
+/// previous round are examined.
 fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), Interrupted> {
     let (world, limits) = (&task.world, task.world.limits);
-    let derived: Vec<AtomId> =
-        (0..dense(world.atoms.len())).map(AtomId).filter(|atom| world.is_derived(*atom)).collect();
+    let mut rules: Vec<Option<GroundAxiom>> = std::mem::take(axioms).into_iter().map(Some).collect();
+    let mut rules_of: FxHashMap<AtomId, Vec<usize>> = FxHashMap::default();
+    let mut readers: FxHashMap<AtomId, Vec<usize>> = FxHashMap::default();
+    let mut round: Vec<(AtomId, bool)> = Vec::new();
+    for item in limits.watch(rules.iter().flatten().enumerate()) {
+        let (rule, axiom) = item?;
+        rules_of.entry(axiom.head).or_default().push(rule);
+        for atom in axiom.body.atoms() {
+            readers.entry(atom).or_default().push(rule);
+        }
+        if axiom.body == GroundCondition::default() {
+            round.push((axiom.head, true));
+        }
+    }
+    // A derived atom without a rule is false.
+    let atoms = (0..dense(world.atoms.len())).map(AtomId);
+    let has_no_rule = atoms.filter(|atom| world.is_derived(*atom) && !rules_of.contains_key(atom));
+    round.extend(has_no_rule.map(|atom| (atom, false)));
+    let mut rule_counts: FxHashMap<AtomId, usize> =
+        rules_of.iter().map(|(head, rules)| (*head, rules.len())).collect();
     let mut truth_values: FxHashMap<AtomId, bool> = FxHashMap::default();
-    loop {
-        let before = truth_values.len();
-        let mut has_rule = FxHashSet::default();
-        for axiom in limits.watch(axioms.iter()) {
-            let axiom = axiom?;
-            has_rule.insert(axiom.head);
-            if axiom.body == GroundCondition::default() {
-                truth_values.insert(axiom.head, true);
+    while !round.is_empty() {
+        let mut affected: Vec<usize> = Vec::new();
+        for item in limits.watch(std::mem::take(&mut round)) {
+            let (atom, value) = item?;
+            if truth_values.insert(atom, value).is_none() {
+                affected.extend(readers.get(&atom).into_iter().flatten());
+                rules_of.get(&atom).into_iter().flatten().for_each(|rule| rules[*rule] = None);
             }
         }
-        // A derived atom without a rule is false.
-        for atom in derived.iter().filter(|atom| !has_rule.contains(*atom)) {
-            truth_values.entry(*atom).or_insert(false);
+        affected.sort_unstable();
+        affected.dedup();
+        for position in limits.watch(affected) {
+            let rule = &mut rules[position?];
+            let Some(axiom) = rule else { continue };
+            let head = axiom.head;
+            if !substitute(&mut axiom.body, &truth_values) {
+                *rule = None;
+                let count = rule_counts.entry(head).or_default();
+                *count = count.saturating_sub(1);
+                round.extend((*count == 0).then_some((head, false)));
+            } else if axiom.body == GroundCondition::default() {
+                round.push((head, true));
+            }
         }
-        if truth_values.len() == before {
-            break;
-        }
-        axioms.retain_mut(|axiom| {
-            !truth_values.contains_key(&axiom.head) && substitute(&mut axiom.body, &truth_values)
-        });
     }
+    axioms.extend(rules.into_iter().flatten());
     retain(&mut task.operators, limits, |operator| {
         operator.conditional.retain_mut(|effect| conjunction(&mut effect.condition, &truth_values));
         substitute(&mut operator.condition, &truth_values)

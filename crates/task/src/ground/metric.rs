@@ -5,7 +5,7 @@
 //! their final values are added to the cost of a plan at its end. A planner that minimises operator costs
 //! alone does not minimise such a metric. A metric to be maximised is negated. Without a metric, the cost is
 //! the total duration if the domain has a durative action, and the number of actions otherwise.
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
 
 use num_traits::{One, Zero};
@@ -82,12 +82,12 @@ fn rest(
     linear: &mut Linear<Rational>,
     (metric, generality): (&Metric, &Generality),
 ) -> Result<Vec<(NumericId, Rational)>, Error> {
-    let mut dependent: Vec<NumericId> = Vec::new();
-    for operator in &task.operators {
-        for (variable, factor) in &linear.coefficients {
-            let Some(value) = operator.numeric_effects.get(*variable) else { continue };
+    let mut dependent: BTreeSet<NumericId> = BTreeSet::new();
+    for operator in task.world.limits.watch(&task.operators) {
+        let operator = operator?;
+        for (variable, value, factor) in measured_effects(operator, linear) {
             // A state-independent change has the form `variable + quantity`.
-            let is_dependent = value.coefficients[..] != [(*variable, Rational::one())];
+            let is_dependent = value.coefficients[..] != [(variable, Rational::one())];
             let is_reward = generality.measures_rewards && lowers(value, factor);
             if is_dependent && !generality.measures_ends {
                 return Err(Error::Unsupported {
@@ -99,14 +99,25 @@ fn rest(
                     place: metric.place,
                 });
             }
-            if (is_dependent || is_reward) && !dependent.contains(variable) {
-                dependent.push(*variable);
+            if is_dependent || is_reward {
+                dependent.insert(variable);
             }
         }
     }
     let (rest, kept) = linear.coefficients.drain(..).partition(|(variable, _)| dependent.contains(variable));
     linear.coefficients = kept;
     Ok(rest)
+}
+
+/// Returns the numeric effects of an operator on the fluents of a metric, each with the factor of the fluent.
+fn measured_effects<'o>(
+    operator: &'o GroundOperator,
+    metric: &'o Linear<Rational>,
+) -> impl Iterator<Item = (NumericId, &'o Linear<Rational>, &'o Rational)> {
+    operator.numeric_effects.iter().filter_map(|(variable, value)| {
+        let position = metric.coefficients.binary_search_by_key(variable, |(fluent, _)| *fluent).ok()?;
+        Some((*variable, value, &metric.coefficients[position].1))
+    })
 }
 
 fn lowers(value: &Linear<Rational>, factor: &Rational) -> bool {
@@ -211,8 +222,7 @@ fn cost(
     scaled: &mut ScaledQuantities,
 ) -> Quantity<Rational> {
     let mut total = scaled.times(&operator.duration, time);
-    for (variable, factor) in &metric.coefficients {
-        let Some(value) = operator.numeric_effects.get(*variable) else { continue };
+    for (_, value, factor) in measured_effects(operator, metric) {
         total.add(&scaled.times(&value.quantity, factor));
     }
     total

@@ -1,6 +1,8 @@
 //! Plans over ground operators, and their execution.
 
-use crate::number::Int;
+use num_traits::Zero;
+
+use crate::number::{Int, Rational};
 use crate::task::number::TaskNumber;
 use crate::task::{OperatorId, State, Task};
 
@@ -66,4 +68,13 @@ pub fn pass<N: TaskNumber>(task: &Task<N>, initial: &State<N>, plan: &[GroundSte
         states.push(next);
     }
     task.is_goal(states.last()?).then_some(states)
+}
+
+/// Returns the value of the state-dependent part of the metric in a state, in the task's cost unit. The value
+/// is negated if the metric is maximised.
+pub fn state_dependent_cost<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
+    let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
+    let terms = task.objective.rest.iter();
+    let terms = terms.map(|(variable, factor)| state.numbers[variable.index()].to_rational() * factor);
+    terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
 }

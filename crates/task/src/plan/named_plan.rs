@@ -12,10 +12,10 @@ use crate::compile::is_hidden;
 use crate::context::Context;
 use crate::lifted::ObjectId;
 use crate::number::{Int, Rational};
-use crate::plan::ground::GroundPlan;
+use crate::plan::ground::{GroundPlan, state_dependent_cost};
 use crate::plan::reschedule::{earliest, starts};
 use crate::task::number::TaskNumber;
-use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
+use crate::task::{Argument, Objective, Operator, OperatorId, Task};
 use pddl::to_decimal;
 
 /// An exact number of arbitrary size, in the units of the PDDL files.
@@ -179,15 +179,6 @@ pub fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> P
     plan
 }
 
-/// Returns the value of the state-dependent part of the metric in a state, in the task's cost unit. The value
-/// is negated if the metric is maximised.
-pub fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
-    let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
-    let terms = task.objective.rest.iter();
-    let terms = terms.map(|(variable, factor)| state.numbers[variable.index()].to_rational() * factor);
-    terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
-}
-
 /// Executes the steps from the initial state. Returns by how much each step changes the state-dependent part of the
 /// metric, and the final value of this part. All numbers are in the task's cost unit and negated if the metric is
 /// maximised. They are 0 if the metric has no such part.
@@ -199,14 +190,14 @@ pub fn measured<'s, N: TaskNumber>(
         return (steps.map(|_| Rational::zero()).collect(), Rational::zero());
     }
     let (mut state, mut added) = (task.initial.clone(), Vec::new());
-    let mut before = rest(task, &state);
+    let mut before = state_dependent_cost(task, &state);
     for (operator, choice) in steps {
         // On overflow, the state does not change. A step may also be inapplicable if it is examined outside its
         // plan; its effects are then applied nevertheless.
         if let Some(next) = task.successor(&task.operators[operator.index()], &state, choice) {
             state = next;
         }
-        let after = rest(task, &state);
+        let after = state_dependent_cost(task, &state);
         added.push(after.clone() - &before);
         before = after;
     }

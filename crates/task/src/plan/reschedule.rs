@@ -2,35 +2,42 @@
 //!
 //! Waiting is free, so an optimal plan may delay an action until an event that only a later action needs. For
 //! each action, the operators for its other timeline windows are therefore tried, with the necessary waits. A
-//! change is kept if the result is still a plan, costs no more, and has lexicographically smaller start times.
+//! change is kept if the result is still a plan with the same values under all objectives, and has lexicographically
+//! smaller start times.
 
 use num_traits::Zero;
 
 use crate::context::Context;
 use crate::number::Rational;
-use crate::plan::ground::{GroundPlan, GroundStep, replay};
+use crate::plan::ground::{GroundPlan, GroundStep, replay, state_dependent_cost};
 use crate::task::number::TaskNumber;
-use crate::task::{Operator, OperatorId, Task};
+use crate::task::{OperatorId, Task};
 
-/// Returns a plan with the same actions and possibly earlier starts. The operator of one action is replaced at
-/// a time, as long as this makes the start times lexicographically smaller. Stops improving once the deadline
-/// passes or the run is interrupted.
+/// Returns a plan with the same actions, the same values under all objectives, and possibly earlier starts. The
+/// operator of one action is replaced at a time, as long as this makes the start times lexicographically smaller. Stops
+/// improving once the deadline passes or the run is interrupted.
 pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> GroundPlan<N> {
     let Context { task, limits } = context;
     let mut plan = plan.clone();
     // Without timed events, sequential execution has no gaps.
-    if task.operators.iter().all(|operator| operator.wait.is_none()) {
+    let waits: Vec<OperatorId> = ids(task).filter(|id| task.operators[id.index()].wait.is_some()).collect();
+    if waits.is_empty() {
         return plan;
     }
+    let Some(values) = values(task, &plan.steps) else { return plan };
     let mut position = 0;
-    while position < plan.steps.len() && !limits.reached() {
+    while position < plan.steps.len() {
         let id = plan.steps[position].operator;
         if task.operators[id.index()].wait.is_none() {
             let current_starts = starts(task, &plan.steps);
-            let tried = same_action(task, id).filter_map(|operator| with(task, &plan, position, operator));
-            let best = tried.map(|tried| (starts(task, &tried.steps), tried)).min_by(|a, b| a.0.cmp(&b.0));
-            if let Some((_, tried)) = best.filter(|(times, _)| *times < current_starts) {
-                plan = tried;
+            let operators = same_action(task, id).take_while(|_| !limits.reached());
+            let tried =
+                operators.filter_map(|operator| with(task, &plan.steps, (position, operator), &waits));
+            let tried = tried.map(|steps| (starts(task, &steps), steps));
+            let earlier = tried.filter(|(times, _)| *times < current_starts);
+            let equal = earlier.filter(|(_, steps)| self::values(task, steps).as_ref() == Some(&values));
+            if let Some((_, steps)) = equal.min_by(|a, b| a.0.cmp(&b.0)) {
+                plan.steps = steps;
                 // The change may have removed waits before earlier actions, so all actions are tried again.
                 position = 0;
                 continue;
@@ -41,37 +48,34 @@ pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) ->
     plan
 }
 
-fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
-    let operator = &task.operators[id.index()];
-    let is_same_action = move |other: &Operator<N>| {
-        other.schema == operator.schema
-            && other.arguments == operator.arguments
-            && other.slots == operator.slots
-    };
-    let operators = task.operators.iter().zip((0..).map(OperatorId));
-    operators.filter(move |(other, other_id)| *other_id != id && is_same_action(other)).map(|(_, id)| id)
+fn ids<N>(task: &Task<N>) -> impl Iterator<Item = OperatorId> {
+    OperatorId::all(task.operators.len())
 }
 
-/// Replaces the operator at `position` by `other`, drops all waits and inserts the necessary waits again.
-/// Returns `None` if the result is not a plan or costs more than `plan`.
+fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
+    let operator = &task.operators[id.index()];
+    ids(task).filter(move |other_id| {
+        let other = &task.operators[other_id.index()];
+        *other_id != id
+            && other.schema == operator.schema
+            && other.arguments == operator.arguments
+            && other.slots == operator.slots
+    })
+}
+
+/// Replaces the operator at a position, drops all waits and inserts the necessary waits again. Returns `None` if a step
+/// is not applicable.
 fn with<N: TaskNumber>(
     task: &Task<N>,
-    plan: &GroundPlan<N>,
-    position: usize,
-    other: OperatorId,
-) -> Option<GroundPlan<N>> {
-    let waits: Vec<OperatorId> = task
-        .operators
-        .iter()
-        .zip((0..).map(OperatorId))
-        .filter(|(operator, _)| operator.wait.is_some())
-        .map(|(_, id)| id)
-        .collect();
+    plan: &[GroundStep],
+    (position, operator): (usize, OperatorId),
+    waits: &[OperatorId],
+) -> Option<Vec<GroundStep>> {
     let is_wait = |step: &GroundStep| task.operators[step.operator.index()].wait.is_some();
     let mut steps: Vec<GroundStep> = Vec::new();
     let mut state = task.initial.clone();
-    for (at, step) in plan.steps.iter().enumerate().filter(|(_, step)| !is_wait(step)) {
-        let step = if at == position { GroundStep { operator: other, ..step.clone() } } else { step.clone() };
+    for (at, step) in plan.iter().enumerate().filter(|(_, step)| !is_wait(step)) {
+        let step = if at == position { GroundStep { operator, ..step.clone() } } else { step.clone() };
         let operator = &task.operators[step.operator.index()];
         // At most one wait is applicable in a state, and each wait leads to a later event.
         while !operator.applicable(&state, &step.choice) {
@@ -79,14 +83,24 @@ fn with<N: TaskNumber>(
             state = task.successor(&task.operators[wait.index()], &state, &[])?;
             steps.push(GroundStep { operator: *wait, choice: Vec::new() });
         }
-        if !operator.admits(&step.choice) {
-            return None;
-        }
         state = task.successor(operator, &state, &step.choice)?;
         steps.push(step);
     }
-    let (_, cost) = replay(task, &steps)?;
-    (cost <= plan.cost).then_some(GroundPlan { steps, cost })
+    Some(steps)
+}
+
+/// Returns the sum of the operator costs under each objective, and the state-dependent part of the metric. Returns
+/// `None` if the steps are not a plan, or a number overflows.
+fn values<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Option<(Vec<N>, Rational)> {
+    let (states, cost) = replay(task, steps)?;
+    let mut costs = vec![cost];
+    for objective in 0..task.others.len() {
+        costs.push(steps.iter().try_fold(N::zero(), |sum, step| {
+            let operator = &task.operators[step.operator.index()];
+            sum.plus(&operator.others[objective].at(&step.choice, &operator.sizes()))
+        })?);
+    }
+    Some((costs, state_dependent_cost(task, states.last()?)))
 }
 
 /// Returns the start times of the actions (without waits) for sequential execution, in the task's time unit.

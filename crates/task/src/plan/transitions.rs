@@ -6,8 +6,8 @@
 use crate::context::Context;
 use crate::limits::Limits;
 use crate::number::Int;
-use crate::plan::ground::{GroundPlan, GroundStep};
-use crate::plan::named_plan::{Exact, Step, decode, metric, rest};
+use crate::plan::ground::{GroundPlan, GroundStep, state_dependent_cost};
+use crate::plan::named_plan::{Exact, Step, decode, metric};
 use crate::task::number::TaskNumber as _;
 use crate::task::{OperatorId, State, Task};
 
@@ -106,7 +106,7 @@ impl Task {
 
     /// Returns the value of the metric for the path that leads to this state.
     pub fn metric(&self, situation: &TaskState) -> Exact {
-        metric(self, &(situation.cost.to_rational() + rest(self, &situation.state)))
+        metric(self, &(situation.cost.to_rational() + state_dependent_cost(self, &situation.state)))
     }
 
     /// Returns the transitions from a state by all applicable actions, without waits and auxiliary actions.

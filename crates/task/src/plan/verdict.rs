@@ -4,6 +4,9 @@ use std::fmt;
 
 use crate::plan::solution::{MetricUnbounded, Proof, Solution, Status};
 
+/// The reason is not always a limit: a solver may have failed, or numbers may overflow.
+const NO_PLAN: &str = "no plan was found, and its absence is not proved";
+
 impl Solution {
     /// Returns the status of the solution and its justification: a sentence without a full stop, or two lines
     /// if the metric may have no best value.
@@ -66,10 +69,8 @@ fn verdict(solution: &Solution) -> String {
             format!("no plan with up to {}, {proved}; longer plans were not considered", steps(horizon))
         }
         (Status::Unknown, _, _) => match &solution.lower_bound {
-            Some(bound) => format!(
-                "a limit was reached before a plan was found; no plan has a better metric than {bound}"
-            ),
-            None => "a limit was reached before a plan was found; nothing is proved".to_owned(),
+            Some(bound) => format!("{NO_PLAN}; no plan has a better metric than {bound}"),
+            None => NO_PLAN.to_owned(),
         },
     }
 }

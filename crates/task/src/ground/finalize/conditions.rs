@@ -1,11 +1,15 @@
 //! Converts conditions and axioms over atoms to conditions and axioms over finite-domain variables.
 
+use rustc_hash::FxHashMap;
+
 use crate::error::Error;
 use crate::ground::finalize::numbers::Numbers;
 use crate::ground::finalize::variables::Atoms;
+use crate::ground::vocabulary::atom::AtomId;
 use crate::ground::vocabulary::axiom::{GroundAxiom, components};
 use crate::ground::vocabulary::condition::GroundCondition;
 use crate::lifted::Rational;
+use crate::limits::Limits;
 use crate::number::checked_lcm;
 use crate::task::number::TaskNumber;
 use crate::task::{Axiom, Condition, Fact, Layer};
@@ -68,11 +72,20 @@ pub(super) fn axioms<N: TaskNumber>(
     axioms: &[GroundAxiom],
     atoms: &Atoms,
     numbers: &mut Numbers<N>,
+    limits: &Limits,
 ) -> Result<Vec<Layer<N>>, Error> {
+    let mut positions: FxHashMap<AtomId, Vec<usize>> = FxHashMap::default();
+    for (position, axiom) in axioms.iter().enumerate() {
+        positions.entry(axiom.head).or_default().push(position);
+    }
     let mut layers = Vec::new();
-    for component in components(axioms) {
+    for component in limits.watch(components(axioms)) {
+        let component = component?;
         let mut layer = Layer { rules: Vec::new(), recursive: component.len() > 1 };
-        for axiom in axioms.iter().filter(|axiom| component.binary_search(&axiom.head).is_ok()) {
+        let mut rules: Vec<usize> =
+            component.iter().flat_map(|head| positions[head].iter().copied()).collect();
+        rules.sort_unstable();
+        for axiom in rules.into_iter().map(|position| &axioms[position]) {
             let Some(head) = atoms.fact(axiom.head) else { continue };
             layer.recursive |= axiom.body.atoms().any(|atom| atom == axiom.head);
             layer.rules.push(Axiom { head, body: condition(&axiom.body, atoms, numbers)? });

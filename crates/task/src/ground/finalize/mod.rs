@@ -72,7 +72,7 @@ pub fn finish<N: TaskNumber>(
     let exclusive =
         || contradictory(&goal).then(|| "the goal requires atoms that exclude each other".to_owned());
     let unreachable = unreachable.or_else(exclusive);
-    let axioms = axioms(&task.axioms, &atoms, &mut numbers)?;
+    let axioms = axioms(&task.axioms, &atoms, &mut numbers, limits)?;
     let mut task = Task {
         object_names: lifted.objects.iter().map(ToString::to_string).collect(),
         schema_names: lifted.schemas.iter().map(|schema| schema.name.to_string()).collect(),

@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 use crate::error::Error;
 use crate::ground::evaluate::normal_form::Definitions;
 use crate::ground::instantiate::change::{GroundChange, atoms, numbers, substitute};
-use crate::ground::instantiate::design_constraints::{admit_some, forbid};
+use crate::ground::instantiate::design_constraints::{admit_some, distinct, forbid};
 use crate::ground::instantiate::simultaneous_effects::SimultaneousEffects;
 use crate::ground::instantiate::timeline_windows::{Interference, TimelineWindow};
 use crate::ground::vocabulary::atom::AtomId;
@@ -211,8 +211,9 @@ impl Case {
                 forbid(&mut forbidden, &rule.slots, combination.clone());
             }
         }
+        let forbidden = distinct(forbidden);
         let sizes: Vec<_> = template.slots.iter().map(|(_, designs)| designs.len()).collect();
-        if admit_some(&forbidden, &sizes, limits)? { Ok(forbidden.into()) } else { Err(Failure::Undefined) }
+        if admit_some(&forbidden, &sizes, limits)? { Ok(forbidden) } else { Err(Failure::Undefined) }
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "something was pushed before")]

@@ -1,19 +1,30 @@
 //! Forbidden combinations of designs, and the test whether any combination remains allowed.
 
+use std::sync::Arc;
+
 use rustc_hash::FxHashSet;
 
 use crate::limits::{Interrupted, LimitPoll, Limits};
 use crate::task::ForbiddenCombinations;
 use crate::task::quantity::SlotSet;
 
+/// Adds a forbidden combination. Combinations may then occur repeatedly until [`distinct`] is called.
 pub(super) fn forbid(forbidden: &mut Vec<ForbiddenCombinations>, slots: &SlotSet, combination: SlotSet) {
     match forbidden.iter_mut().find(|rule| rule.slots == *slots) {
-        Some(rule) if rule.combinations.contains(&combination) => {}
         Some(rule) => rule.combinations.push(combination),
         None => {
             forbidden.push(ForbiddenCombinations { slots: slots.clone(), combinations: vec![combination] });
         }
     }
+}
+
+/// Removes repeated combinations. The others keep their order.
+pub(super) fn distinct(mut forbidden: Vec<ForbiddenCombinations>) -> Arc<[ForbiddenCombinations]> {
+    for rule in &mut forbidden {
+        let mut combinations = FxHashSet::default();
+        rule.combinations.retain(|combination| combinations.insert(combination.clone()));
+    }
+    forbidden.into()
 }
 
 /// Returns `true` if there is a combination of designs that no constraint forbids. `sizes` is the number of

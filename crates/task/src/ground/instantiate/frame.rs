@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::ground::evaluate::condition::residual;
 use crate::ground::evaluate::expression::ground;
 use crate::ground::evaluate::slots::Slots;
-use crate::ground::instantiate::design_constraints::admit_some;
+use crate::ground::instantiate::design_constraints::{admit_some, distinct};
 use crate::ground::instantiate::instance_builder::{Apart, Build};
 use crate::ground::instantiate::slot_split::{SplitSchema, open_operand};
 use crate::ground::vocabulary::atom::{Binding, arguments};
@@ -83,7 +83,7 @@ impl<'a> SharedInstanceData<'a> {
         };
         // PDDL requires durations of at least 0.
         build.forbid_negative(&duration)?;
-        let forbidden = build.forbidden;
+        let forbidden = distinct(build.forbidden);
         if !admit_some(&forbidden, &designs.sizes(), world.limits)? {
             return Ok(None);
         }
@@ -91,7 +91,6 @@ impl<'a> SharedInstanceData<'a> {
         let slots = outline.parameters.iter().zip(&designs.designs);
         let slots: Option<_> = slots.map(|(slot, own)| Some((function(slot)?, own.clone()))).collect();
         let slots = slots.expect("invariant: the function of a slot is not a slot");
-        let forbidden = forbidden.into();
         Ok(Some(Self {
             designs,
             slots,

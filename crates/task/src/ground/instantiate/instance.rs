@@ -6,7 +6,7 @@ use crate::compile::is_violation_count;
 use crate::ground::evaluate::normal_form::Definitions;
 use crate::ground::evaluate::reads::Reads;
 use crate::ground::instantiate::conditional_effects::{Middle, cases};
-use crate::ground::instantiate::design_constraints::{admit_some, forbid};
+use crate::ground::instantiate::design_constraints::{admit_some, distinct, forbid};
 use crate::ground::instantiate::frame::SharedInstanceData;
 use crate::ground::instantiate::instance_builder::Build;
 use crate::ground::instantiate::simultaneous_effects::{SimultaneousEffects, clashes};
@@ -70,7 +70,9 @@ impl<'a> Instantiation<'a> {
             return Ok(operators);
         };
         let conflicts = conflicts(world, timeline, schema, (&start, &end), core);
-        for passage in TimelineWindow::all(timeline, &frame.duration, &conflicts) {
+        let limits = world.limits;
+        for passage in limits.watch(TimelineWindow::all(timeline, &frame.duration, &conflicts)) {
+            let passage = passage?;
             let middle = Middle { passage: Some(&passage), ..untimed };
             let template = GroundOperator { timing: passage.0.timing(), ..template.clone() };
             for case in cases(schema, &before, &start, &middle, &end)? {
@@ -94,8 +96,9 @@ fn forbidden(
             forbid(&mut forbidden, &rule.slots, combination.clone());
         }
     }
+    let forbidden = distinct(forbidden);
     let is_admissible = admit_some(&forbidden, &frame.designs.sizes(), build.world.limits)?;
-    Ok(is_admissible.then(|| forbidden.into()))
+    Ok(is_admissible.then_some(forbidden))
 }
 
 fn template(

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::error::{Error, File, Place};
 use crate::ground::evaluate::condition::residual;
 use crate::ground::evaluate::slots::{Slots, for_each_combination, open};
-use crate::ground::instantiate::design_constraints::forbid;
+use crate::ground::instantiate::design_constraints::{distinct, forbid};
 use crate::ground::vocabulary::atom::Binding;
 use crate::ground::vocabulary::eval_error::{Failure, possible};
 use crate::ground::vocabulary::partial_eval::{Residual, compare};
@@ -74,7 +74,7 @@ impl Build<'_, '_> {
         let outer = std::mem::take(&mut self.forbidden);
         let operand = possible(self.open(expression));
         let undefined = std::mem::replace(&mut self.forbidden, outer);
-        Ok(Apart { operand: operand?, undefined: undefined.into() })
+        Ok(Apart { operand: operand?, undefined: distinct(undefined) })
     }
 
     pub(super) fn open(&mut self, expression: &Expression) -> Result<Linear<Rational>, Failure> {

@@ -69,7 +69,10 @@ impl<'t> TimelineWindow<'t> {
         for from in timeline.first..timeline.phases.len() {
             let before = from.checked_sub(1);
             let own: &[Residual] = before.map_or(&[], |event| &conflicts.start[event]);
-            for to in from..timeline.phases.len() {
+            // The action starts at or after event `before`, so it ends in this phase or later.
+            let earliest = before.map_or(least.clone(), |event| least.clone() + &timeline.events[event].0);
+            let first = from + timeline.events[from..].partition_point(|(time, _)| *time <= earliest);
+            for to in first..timeline.phases.len() {
                 let apart = |later: usize, earlier: usize| {
                     timeline.events[later].0.clone() - &timeline.events[earlier].0
                 };
@@ -78,14 +81,6 @@ impl<'t> TimelineWindow<'t> {
                 // later phase is reached either.
                 if to > from && most <= apart(to - 1, from) {
                     break;
-                }
-                let fits = match (before, to < timeline.events.len()) {
-                    (Some(before), true) => least < apart(to, before),
-                    (None, true) => least < timeline.events[to].0,
-                    _ => true,
-                };
-                if !fits {
-                    continue;
                 }
                 let mut add = |start, end| {
                     let passage = Self { timeline, duration, from, to, start, end };

@@ -46,7 +46,7 @@ pub fn prune(task: &mut GroundTask<'_>, generality: &Generality) -> Result<Optio
         let reason = "the numbers that the goal requires cannot be reached, even if nothing is ever deleted";
         return Ok(Some(reason.into()));
     }
-    drop_unread_numerics(task);
+    drop_unread_numerics(task)?;
     backward(task)?;
     Ok(None)
 }
@@ -64,5 +64,5 @@ fn why_goal_is_false(task: &GroundTask<'_>) -> String {
             }
         }
     }
-    "the goal contradicts static facts".into()
+    "the goal contradicts itself or static facts".into()
 }

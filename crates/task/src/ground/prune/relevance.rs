@@ -1,7 +1,7 @@
 //! Relevance analysis: removes effects on atoms and numbers that nothing reads, and then operators that neither
 //! change the state nor reduce the cost.
 
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::ground::vocabulary::atom::AtomId;
 use crate::ground::vocabulary::operator::GroundOperator;
@@ -13,7 +13,8 @@ use crate::task::quantity::{NumericId, Quantity};
 /// Removes effects on numeric variables that no condition reads and whose final values are not part of an objective.
 /// A variable is also read if the new value of a read variable depends on it. Operator costs must already have been
 /// computed.
-pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
+pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
+    let limits = task.world.limits;
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
     let bodies = task.axioms.iter().map(|axiom| &axiom.body);
     let comparisons = conditions.chain(bodies).flat_map(|condition| &condition.comparisons);
@@ -23,18 +24,22 @@ pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     read.extend(
         task.objectives.iter().flat_map(|objective| objective.rest.iter().map(|(variable, _)| *variable)),
     );
+    // For each variable, the variables from which an operator computes its new value.
+    let mut sources: FxHashMap<NumericId, Vec<NumericId>> = FxHashMap::default();
+    for operator in limits.watch(&task.operators) {
+        for (variable, value) in operator?.numeric_effects.iter() {
+            let inputs = value.coefficients.iter().map(|(source, _)| *source);
+            sources.entry(*variable).or_default().extend(inputs.filter(|source| source != variable));
+        }
+    }
     let mut open: Vec<NumericId> = read.iter().copied().collect();
     while let Some(variable) = open.pop() {
-        let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(variable));
-        for (source, _) in values.flat_map(|value| &value.coefficients) {
-            if read.insert(*source) {
-                open.push(*source);
-            }
-        }
+        open.extend(sources.remove(&variable).into_iter().flatten().filter(|source| read.insert(*source)));
     }
     for operator in &mut task.operators {
         operator.numeric_effects.retain(&|variable| read.contains(&variable));
     }
+    Ok(())
 }
 
 /// Removes irrelevant rules, effects and operators until no more operators can be removed.

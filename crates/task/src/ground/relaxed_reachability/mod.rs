@@ -25,7 +25,7 @@ use crate::ground::vocabulary::atom::{AtomSet, Binding};
 use crate::ground::vocabulary::reached::RelaxedReachability;
 use crate::lifted::configuration::SlotParameter;
 use crate::lifted::{Arguments, Lifted, ObjectId, PredicateId};
-use crate::limits::{Interrupted, Limits};
+use crate::limits::Limits;
 
 /// Computes the reachable instances of all schemas, the reachable fluent atoms, and the facts of static derived
 /// predicates.
@@ -42,13 +42,14 @@ pub fn reach(
     if variables.any(|count| u16::try_from(count).is_err()) {
         return Err(Error::Rules("an action or axiom with more than 65,535 variables".into()));
     }
-    let mut relaxed = ReachabilityProgramBuilder::new(lifted, limits);
+    let unreached = RelaxedReachability::default();
+    let mut relaxed = ReachabilityProgramBuilder::new(lifted, &unreached, limits);
     for axiom in &lifted.axioms {
         add_axiom(&mut relaxed, axiom)?;
     }
     let schemas =
         lifted.schemas.iter().zip(slots).map(|(schema, slots)| add_schema(&mut relaxed, schema, slots));
-    let applicable: Vec<_> = schemas.collect::<Result<_, Interrupted>>()?;
+    let applicable: Vec<_> = schemas.collect::<Result<_, Error>>()?;
     let (symbols, rules, facts) = relaxed.finish();
     let objects: FxHashMap<Symbol, ObjectId> =
         symbols.objects.iter().copied().zip((0..).map(ObjectId)).collect();

@@ -2,18 +2,15 @@
 
 use rules::{Atom, Symbol};
 
+use crate::error::Error;
 use crate::ground::relaxed_reachability::relaxed::{
     Candidates, ReachabilityProgramBuilder, free, with_bound,
 };
 use crate::lifted::configuration::{SlotParameter, atoms, conjuncts};
 use crate::lifted::{Axiom, Change, Effect, Formula, Lifted, PredicateId, Schema, Term};
-use crate::limits::Interrupted;
 use crate::number::dense;
 
-pub(super) fn add_axiom(
-    relaxed: &mut ReachabilityProgramBuilder<'_>,
-    axiom: &Axiom,
-) -> Result<(), Interrupted> {
+pub(super) fn add_axiom(relaxed: &mut ReachabilityProgramBuilder<'_>, axiom: &Axiom) -> Result<(), Error> {
     let parameters: Vec<u32> = (0..dense(axiom.parameters.len())).collect();
     let candidates: Candidates =
         parameters.iter().copied().zip(axiom.parameters.iter().map(|p| p.candidates.clone())).collect();
@@ -30,7 +27,7 @@ pub(super) fn add_schema(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     schema: &Schema,
     slots: &[SlotParameter],
-) -> Result<(Symbol, Vec<u32>), Interrupted> {
+) -> Result<(Symbol, Vec<u32>), Error> {
     let number = relaxed.fresh("applicable");
     let is_slot = |parameter: &u32| slots.iter().any(|slot| slot.parameter == *parameter);
     let parameters: Vec<u32> = (0..dense(schema.parameters.len())).collect();
@@ -71,7 +68,7 @@ fn add_effects(
     schema: &Schema,
     applicable: Atom,
     candidates: &Candidates,
-) -> Result<(), Interrupted> {
+) -> Result<(), Error> {
     let mut plain = Vec::new();
     for Effect { bound, condition, change } in schema.start_effects.iter().chain(&schema.end_effects) {
         let Change::Add(predicate, terms) = change else { continue };

@@ -11,14 +11,16 @@ use std::sync::Arc;
 use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term as RuleTerm, Variable};
 use rustc_hash::FxHashMap;
 
+use crate::error::Error;
 use crate::ground::evaluate::condition::residual;
 use crate::ground::evaluate::join::each_binding;
+use crate::ground::vocabulary::eval_error::Failure;
 use crate::ground::vocabulary::partial_eval::Residual;
 use crate::ground::vocabulary::reached::RelaxedReachability;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::configuration::{formula_terms, has_numbers, is_static};
 use crate::lifted::{Arguments, Bound, Formula, Lifted, ObjectId, PredicateId, Term};
-use crate::limits::{Interrupted, Limits};
+use crate::limits::Limits;
 use crate::number::dense;
 
 pub(super) type Candidates = BTreeMap<u32, Arc<[ObjectId]>>;
@@ -33,6 +35,9 @@ pub(super) struct ReachabilityProgramBuilder<'a> {
     pub(super) lifted: &'a Lifted,
     limits: &'a Limits,
     names: Names,
+    unreached: &'a RelaxedReachability,
+    /// The values of static functions, created for the first comparison.
+    world: Option<World<'a>>,
     types: FxHashMap<Arc<[ObjectId]>, Symbol>,
     facts: Vec<Fact>,
     rules: Vec<Rule>,
@@ -40,7 +45,7 @@ pub(super) struct ReachabilityProgramBuilder<'a> {
 }
 
 impl<'a> ReachabilityProgramBuilder<'a> {
-    pub(super) fn new(lifted: &'a Lifted, limits: &'a Limits) -> Self {
+    pub(super) fn new(lifted: &'a Lifted, unreached: &'a RelaxedReachability, limits: &'a Limits) -> Self {
         let mut table = Symbols::new();
         let objects: Vec<_> = (0..lifted.objects.len()).map(|i| table.name(&format!("object {i}"))).collect();
         let predicates: Vec<_> =
@@ -58,7 +63,17 @@ impl<'a> ReachabilityProgramBuilder<'a> {
             })
             .collect();
         let names = Names { table, objects, predicates };
-        Self { lifted, limits, names, types: FxHashMap::default(), facts, rules: Vec::new(), relations: 0 }
+        Self {
+            lifted,
+            limits,
+            names,
+            unreached,
+            world: None,
+            types: FxHashMap::default(),
+            facts,
+            rules: Vec::new(),
+            relations: 0,
+        }
     }
 
     pub(super) fn finish(self) -> (Names, Vec<Rule>, Vec<Fact>) {
@@ -125,7 +140,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         candidates: &Candidates,
         exact: bool,
         out: &mut Vec<Atom>,
-    ) -> Result<(), Interrupted> {
+    ) -> Result<(), Error> {
         self.limits.check()?;
         match formula {
             Formula::And(parts) => {
@@ -183,7 +198,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         parts: &[Formula],
         candidates: &Candidates,
         exact: bool,
-    ) -> Result<Symbol, Interrupted> {
+    ) -> Result<Symbol, Error> {
         let relation = self.fresh("auxiliary");
         let variables = free(formula);
         for part in parts {
@@ -209,10 +224,11 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         }
     }
 
-    fn comparison(&mut self, formula: &Formula, candidates: &Candidates) -> Result<Symbol, Interrupted> {
+    fn comparison(&mut self, formula: &Formula, candidates: &Candidates) -> Result<Symbol, Error> {
         let relation = self.fresh("comparison");
         let variables = free(formula);
-        let rows = satisfying(self.lifted, formula, &variables, candidates, self.limits)?;
+        let world = self.world.get_or_insert_with(|| World::new(self.lifted, self.unreached, self.limits));
+        let rows = satisfying(world, formula, &variables, candidates)?;
         for row in rows {
             let arguments = row.iter().map(|object| self.names.objects[object.index()]).collect();
             self.facts.push(Fact { predicate: relation, arguments });
@@ -227,29 +243,29 @@ fn variable(number: u32) -> RuleTerm {
 
 #[expect(clippy::arithmetic_side_effects, reason = "variables of a condition are numbered in memory")]
 fn satisfying(
-    lifted: &Lifted,
+    world: &mut World<'_>,
     comparison: &Formula,
     variables: &[u32],
     candidates: &Candidates,
-    limits: &Limits,
-) -> Result<Vec<Arguments>, Interrupted> {
-    let reached = RelaxedReachability::default();
-    let mut world = World::new(lifted, &reached, limits);
+) -> Result<Vec<Arguments>, Error> {
     let bound: Vec<_> = variables
         .iter()
         .filter_map(|v| Some(Bound { variable: *v, candidates: candidates.get(v)?.clone() }))
         .collect();
     let mut binding = vec![None; variables.iter().max().map_or(0, |v| *v as usize + 1)];
-    let mut rows = Vec::new();
-    each_binding(&mut world, &bound, &[], &mut binding, &mut |world, binding| {
-        if matches!(residual(world, comparison, binding), Ok(Residual::True)) {
-            rows.push(variables.iter().filter_map(|v| binding[*v as usize]).collect());
+    let (mut rows, mut error) = (Vec::new(), None);
+    each_binding(world, &bound, &[], &mut binding, &mut |world, binding| {
+        match residual(world, comparison, binding) {
+            Ok(Residual::True) => {
+                rows.push(variables.iter().filter_map(|v| binding[*v as usize]).collect());
+            }
+            Err(Failure::Error(failure)) => error = Some(failure),
+            _ => {}
         }
-        true
+        error.is_none()
     })?;
-    // If a limit stopped the enumeration, its result is incomplete and must not be used.
-    limits.check()?;
-    Ok(rows)
+    // Without the remaining rows, instances would be missing.
+    error.map_or(Ok(rows), Err)
 }
 
 pub(super) fn with_bound(candidates: &Candidates, bound: &[Bound]) -> (Vec<u32>, Candidates) {
