@@ -26,7 +26,7 @@ fn main() {
     // The task has a plan, so the claim of unsolvability is not proved.
     match check(TASK, ARGUMENT, None) {
         Ok(_) => println!("there is no plan"),
-        Err(Fault::Goal(label)) => println!("there may be a plan: label {label} is a goal"),
+        Err(Fault::Solvable(label)) => println!("there may be a plan: label {label} is a goal"),
         Err(fault) => println!("not proved: {fault}"),
     }
 }

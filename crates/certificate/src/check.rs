@@ -69,9 +69,13 @@ pub enum Fault {
     #[error("no label covers the initial state")]
     Initial,
     /// A label (state of the proof), given by its position in the argument, is a goal state with a
-    /// smaller cost than claimed, or any goal state if the claim is that there is no plan.
+    /// smaller cost than claimed.
     #[error("label {0} is a goal state, and cheaper than claimed")]
     Goal(usize),
+    /// A label (state of the proof), given by its position in the argument, is a goal state, but the
+    /// claim is that there is no plan.
+    #[error("label {0} is a goal state, but the claim is that there is no plan")]
+    Solvable(usize),
     /// A successor of a label (state of the proof) is neither covered by a label nor pruned by a
     /// bound.
     #[error("label {label}, operator {operator}: nothing covers the state that follows")]
@@ -237,10 +241,12 @@ impl Checker<'_> {
             }
             let state = self.model.state(&label.0, &label.1);
             let paid = &label.2;
-            if self.model.holds(&self.model.goal, &state, &[], &[])
-                && self.cost.is_none_or(|cost| paid < cost)
-            {
-                return Err(Fault::Goal(position));
+            if self.model.holds(&self.model.goal, &state, &[], &[]) {
+                match &self.cost {
+                    None => return Err(Fault::Solvable(position)),
+                    Some(cost) if paid < cost => return Err(Fault::Goal(position)),
+                    Some(_) => {}
+                }
             }
             for operator in index.candidates(&state) {
                 if !self.successors_are_covered(operator, &state, paid) {

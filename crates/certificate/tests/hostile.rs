@@ -233,6 +233,28 @@ fn needs_are_proved_only_if_each_step_requires_at_least_its_use() {
     }
 }
 
+/// `(total-cost)` is 0 unless `:init` sets it. So `x` takes no time, and its condition over all never applies.
+#[test]
+fn a_duration_of_total_cost_without_a_value_is_zero() {
+    let action = |duration: &str| {
+        format!(
+            "(define (domain d) (:predicates (a) (p))
+              (:durative-action x :parameters () :duration (= ?duration {duration})
+                :condition (over all (p)) :effect (at end (a))))"
+        )
+    };
+    let nothing =
+        task("", &["(a)"], &[]).replace(r#""goal": {"facts": [[1, 0]]}"#, r#""goal": {"facts": [[0, 0]]}"#);
+    for (duration, is_executable) in [("(total-cost)", true), ("0", true), ("(+ 1 (total-cost))", false)] {
+        let problem = "(define (problem p) (:domain d) (:init) (:goal (a)))";
+        let (domain, problem) = read(&action(duration), problem);
+        let witness = witness(&domain, &problem, &nothing, &|| false).expect("a witness");
+        let verdict = faithful(&domain, &problem, &nothing, &witness, &|| false);
+        let is_missed = matches!(verdict, Faithful::No(Difference::NoOperatorFor { .. }));
+        assert_eq!(is_missed, is_executable, "{duration}: {verdict:?}");
+    }
+}
+
 const STAGES: &str = "(define (domain d) (:predicates (idle) (loading) (loaded) (done))
   (:action begin :parameters () :precondition (idle) :effect (and (not (idle)) (loading)))
   (:action load :parameters () :precondition (loading) :effect (and (not (loading)) (loaded)))
@@ -304,4 +326,20 @@ fn numbers_with_too_many_digits_are_rejected() {
     let claim = BigRational::from_integer(1.into());
     let fault = check(&task, argument, Some(&claim)).expect_err("too long");
     assert!(fault.to_string().contains("a number of 10000000 digits, more than 10000"), "{fault}");
+}
+
+/// A fault describes the claim: every goal state refutes that there is no plan, independently of its cost.
+#[test]
+fn a_goal_state_refutes_each_claim_in_its_words() {
+    let task = task("", &["(a)", "(b)"], &[]).replace(r#""values": [1, 1]"#, r#""values": [1, 0]"#);
+    let argument =
+        r#"{"format": "metaplan-argument/1", "potentials": [], "needs": [], "labels": [[[1, 0], [], 0]]}"#;
+    let one = BigRational::from_integer(1.into());
+    for (claim, expected) in [
+        (Some(&one), "label 0 is a goal state, and cheaper than claimed"),
+        (None, "label 0 is a goal state, but the claim is that there is no plan"),
+    ] {
+        let fault = check(&task, argument, claim).expect_err("a goal state");
+        assert_eq!(fault.to_string(), expected);
+    }
 }

@@ -477,7 +477,7 @@ pub(super) fn has_value(problem: &Problem, function: &Name) -> bool {
 }
 
 /// Returns `true` if the action has the name `only`, or if there is no such name.
-fn is_only(action: &Action, only: Option<&str>) -> bool {
+pub(super) fn is_only(action: &Action, only: Option<&str>) -> bool {
     only.is_none_or(|only| both(&action.individual).iter().any(|own| only.eq_ignore_ascii_case(own)))
 }
 
@@ -487,7 +487,7 @@ fn estimation<'d>(design: &'d FunctionDesign, attribute: &str) -> Option<&'d Big
     design.estimations.get(attribute).or_else(|| design.estimations.get(plain(attribute)))
 }
 
-fn plain(attribute: &str) -> &str {
+pub(super) fn plain(attribute: &str) -> &str {
     attribute.strip_prefix("fd_").unwrap_or(attribute)
 }
 
@@ -590,8 +590,8 @@ impl Fill<'_> {
             if stated.contains(&symbols.iter().map(|name| Name::new(name)).collect::<Vec<_>>()) {
                 // The problem already states this fact.
             } else if let Some(name) = symbols.iter().find(|name| !is_pddl_name(name)) {
-                let text =
-                    format!("`{}` requires `{name}`, which is not a PDDL name", action.individual.name);
+                let action = &action.individual.name;
+                let text = format!("`{name}` in the requirements of `{action}` is not a PDDL name");
                 self.warnings.push(Message::error("M117", text));
             } else if symbols.len() == declared.parameters.len() {
                 self.fact(&declared.identifier.name, &symbols);

@@ -5,8 +5,8 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M101",
         "A file cannot be read.",
-        "It does not exist, is not a regular file, is too large, or the operating system refuses it. A manifest is not UTF-8.",
-        "Check the path; paths in a manifest are relative to the manifest. Convert a manifest to UTF-8.",
+        "It does not exist, is not a regular file, is too large, or the operating system refuses it. A manifest or rule file is not UTF-8.",
+        "Check the path; paths in a manifest are relative to the manifest. Convert a manifest or rule file to UTF-8.",
     ],
     [
         "M102",
@@ -40,8 +40,8 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "M117",
-        "A function cannot be named in PDDL.",
-        "The local name of a function in the knowledge base has characters that PDDL does not allow.",
+        "A function or action cannot be named in PDDL.",
+        "The local name of a function, or of an action that requires functions, has characters that PDDL does not allow.",
         "Rename it, or map it to another name in `[bindings.names]`.",
     ],
     [

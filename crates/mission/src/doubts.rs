@@ -1,15 +1,16 @@
 //! Lints: warnings about legal but suspicious missions, which adapt less than their authors expect. Most of these
 //! lints report names that occur only in the knowledge base or only in the PDDL files.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use diagnostics::nearest;
 use ontology::tomasys::FunctionDesign;
 use ontology::vocab::local_name;
 use pddl::ast::{ActionBody, Assignment, Effect, Identifier, InitialElement, Name};
 use pddl::{Diagnostic, Mentioned, Severity, print_domain};
-use rules::{Engine, Fact};
+use rules::{Engine, Fact, Symbol};
 
+use crate::binding;
 use crate::joined::Mission;
 use crate::knowledge::{Knowledge, doubt_about};
 use crate::message::{Message, did_you_mean};
@@ -45,27 +46,29 @@ impl Mission {
             catalogue.measurements().iter().map(|measurement| measurement.attribute.as_str()).collect();
         let actions: BTreeSet<&str> =
             catalogue.actions().iter().map(|action| local_name(&action.individual.iri)).collect();
-        let doubt = |symbol: &str, query: &str, lacks: &str, name: &str, names: &BTreeSet<&str>| {
-            let suggestion = did_you_mean(name, names.iter().copied());
-            let text = format!("`{symbol}` is bound to `{query}`, but {lacks} `{name}`{suggestion}");
-            Message::warning("M227", text)
-        };
         let idle = |(symbol, query): (&String, &String)| {
             let (kind, name) = query.split_once(':')?;
+            let is_used = catalogue.actions().iter().any(|action| match kind {
+                "action" => self.bindings.is_action(&Name::new(symbol), &action.individual),
+                "requires" => binding::is_only(action, Some(name)),
+                _ => false,
+            });
             let empty = BTreeSet::new();
             let (lacks, names) = match kind {
                 "estimation" | "chosen" | "reconfigured" => ("no design has an estimation of", &estimated),
                 "measured" => ("there is no measurement of", &measured),
-                "action" if catalogue.actions().iter().any(|own| own.individual.iri == name) => return None,
-                "action" | "requires" => ("the knowledge base has no action", &actions),
+                "action" | "requires" if !is_used => ("the knowledge base has no action", &actions),
                 "class" if catalogue.members(&view, name).is_empty() => {
                     ("the knowledge base has no individuals of", &empty)
                 }
                 _ => return None,
             };
-            let plain = name.strip_prefix("fd_").unwrap_or(name);
-            let is_there = [name, plain, &format!("a_{name}")].iter().any(|form| names.contains(*form));
-            (!is_there).then(|| doubt(symbol, query, lacks, name, names))
+            if names.contains(name) || names.contains(binding::plain(name)) {
+                return None;
+            }
+            let suggestion = did_you_mean(name, names.iter().copied());
+            let text = format!("`{symbol}` is bound to `{query}`, but {lacks} `{name}`{suggestion}");
+            Some(Message::warning("M227", text))
         };
         self.bindings.written().iter().filter_map(idle).collect()
     }
@@ -158,8 +161,7 @@ impl Mission {
         if self.domain.functions.is_empty() {
             return Vec::new();
         }
-        let mut problem = self.problem.clone();
-        self.fill(&mut problem);
+        let problem = self.current();
         let valued: BTreeSet<&Name> = problem
             .init
             .iter()
@@ -215,12 +217,23 @@ fn assigns(effect: &Effect, name: &Name) -> bool {
     }
 }
 
+/// The asserted facts, by argument.
+type Stated = BTreeMap<Symbol, Vec<Fact>>;
+
+fn stated(engine: &Engine) -> Stated {
+    let mut stated = Stated::new();
+    for fact in engine.facts().filter(|fact| engine.is_asserted(fact)) {
+        fact.arguments.iter().for_each(|argument| stated.entry(*argument).or_default().push(fact.clone()));
+    }
+    stated
+}
+
 /// Returns the asserted facts about an individual: those with the individual as their first
 /// argument, and those with the individual as another argument.
-fn stated(engine: &Engine, iri: &str) -> (Vec<Fact>, Vec<Fact>) {
-    let Some(symbol) = engine.symbols().find_name(iri) else { return (Vec::new(), Vec::new()) };
-    let facts = engine.facts().filter(|fact| engine.is_asserted(fact) && fact.arguments.contains(&symbol));
-    facts.partition(|fact| fact.arguments.first() == Some(&symbol))
+fn about<'s>(engine: &Engine, stated: &'s Stated, iri: &str) -> (Vec<&'s Fact>, Vec<&'s Fact>) {
+    let symbol = engine.symbols().find_name(iri);
+    let facts = symbol.and_then(|symbol| stated.get(&symbol)).into_iter().flatten();
+    facts.partition(|fact| fact.arguments.first() == symbol.as_ref())
 }
 
 /// Warns about components that occur only as values in facts about other individuals, and about components that no
@@ -233,12 +246,13 @@ fn components(knowledge: &Knowledge) -> Vec<Message> {
         .map(|component| component.iri.as_str())
         .collect();
     let components = view.components();
-    let names: Vec<String> = components.iter().map(|component| component.individual.name.clone()).collect();
+    let stated = stated(engine);
     let mut doubts = Vec::new();
     for component in components.iter().map(|component| &component.individual) {
-        let (about, referring) = stated(engine, &component.iri);
+        let (about, referring) = about(engine, &stated, &component.iri);
         if about.is_empty() {
-            let candidates = names.iter().map(String::as_str).filter(|name| **name != component.name);
+            let names = components.iter().map(|known| known.individual.name.as_str());
+            let candidates = names.filter(|name| *name != component.name);
             let suggestion = did_you_mean(&component.name, candidates);
             let text = format!(
                 "the component <{}> is only mentioned and has no other statement{suggestion}",
@@ -279,7 +293,8 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
         .collect();
     let mut doubts = Vec::new();
     let attributes = view.attribute_types();
-    let mentioned = |iri: &str| stated(engine, iri).0.is_empty();
+    let stated = stated(engine);
+    let mentioned = |iri: &str| about(engine, &stated, iri).0.is_empty();
     for kind in attributes.iter().filter(|kind| mentioned(&kind.iri)) {
         let candidates =
             attributes.iter().filter(|candidate| candidate.iri != kind.iri && !mentioned(&candidate.iri));
@@ -288,9 +303,9 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
             format!("the attribute <{}> is only mentioned and has no other statement{suggestion}", kind.iri);
         doubts.push(doubt_about(knowledge, "M229", &kind.iri, text));
     }
-    for kind in attributes {
+    for kind in &attributes {
         let used = estimated.contains(kind.name.as_str()) || bounded.contains(kind.name.as_str());
-        if !used && stated(engine, &kind.iri).1.is_empty() {
+        if !used && about(engine, &stated, &kind.iri).1.is_empty() {
             let text = format!("the attribute <{}> has neither values nor bounds", kind.iri);
             doubts.push(doubt_about(knowledge, "M209", &kind.iri, text));
         }

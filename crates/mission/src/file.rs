@@ -72,11 +72,13 @@ pub enum Kind {
 impl Kind {
     /// Returns the kind of a text. Returns `None` if the text begins like none of these kinds.
     pub fn of(text: &str) -> Option<Self> {
-        let mut lines = text.lines().map(str::trim_start);
-        let first = lines.find(|line| !line.is_empty() && !line.starts_with([';', '#']))?;
-        let content = &text[text.find(first).unwrap_or(0)..];
-        let words: String = content.chars().take(200).collect::<String>().to_ascii_lowercase();
-        let words = words.replace('(', " ( ");
+        let lines = text.lines().map(str::trim_start);
+        let mut lines = lines.filter(|line| !line.is_empty() && !line.starts_with([';', '#']));
+        let first = lines.next()?;
+        // A comment of PDDL may also end a line.
+        let parts = std::iter::once(first).chain(lines).flat_map(|line| [line.split(';').next(), Some(" ")]);
+        let words: String = parts.flatten().flat_map(str::chars).take(200).collect();
+        let words = words.to_ascii_lowercase().replace('(', " ( ");
         let words: Vec<&str> = words.split_whitespace().take(4).collect();
         match words[..] {
             ["(", "define", "(", "domain", ..] => Some(Self::Domain),
@@ -221,6 +223,8 @@ mod tests {
     fn kinds_are_detected_by_their_first_words() {
         check("; a domain\n\n ( define(domain d)", Some(Kind::Domain));
         check("(define (problem p)", Some(Kind::Problem));
+        check("; see (define (problem p))\n(define\n; of the robot\n(domain d)", Some(Kind::Domain));
+        check("; see (define (domain d))\n(define ; (domain d)\n  (problem p)", Some(Kind::Problem));
         check("# a robot\n@prefix : <http://e.org/> .", Some(Kind::Knowledge));
         check("<?xml version=\"1.0\"?>", Some(Kind::Knowledge));
         check("# a mission\nname = \"ugv\"", Some(Kind::Manifest));

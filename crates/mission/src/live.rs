@@ -96,13 +96,8 @@ impl Mission {
     /// arguments`.
     pub fn holds(&self, fact: &str) -> bool {
         let words: Vec<Name> = fact.split_whitespace().map(Name::new).collect();
-        self.problem.init.iter().any(|element| match element {
-            InitialElement::Fact(atom) => {
-                let arguments = atom.arguments.iter().map(Term::name);
-                std::iter::once(&atom.predicate.name).chain(arguments).eq(&words)
-            }
-            _ => false,
-        })
+        let is_meant = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if is_named(atom, &words));
+        self.problem.init.iter().any(is_meant)
     }
 
     /// Returns the numeric functions without parameters that have a value in the problem, with
@@ -119,7 +114,7 @@ impl Mission {
 
     /// Returns the value that the problem states for a numeric function, given as `name arguments`.
     pub fn value(&self, name: &str) -> Option<BigRational> {
-        let words: Vec<&str> = name.split_whitespace().collect();
+        let words: Vec<Name> = name.split_whitespace().map(Name::new).collect();
         self.problem.init.iter().find_map(|element| match element {
             InitialElement::Value(atom, value, _) if is_named(atom, &words) => Some(value.clone()),
             _ => None,
@@ -129,7 +124,7 @@ impl Mission {
     /// Adds a number to the value that a problem states for a numeric function, given as `name arguments`. Does nothing
     /// if it states none.
     pub fn add_to_value(problem: &mut Problem, name: &str, change: &BigRational) {
-        let words: Vec<&str> = name.split_whitespace().collect();
+        let words: Vec<Name> = name.split_whitespace().map(Name::new).collect();
         for element in &mut problem.init {
             match element {
                 InitialElement::Value(atom, value, _) if is_named(atom, &words) => *value += change,
@@ -152,8 +147,8 @@ impl Mission {
         self.decides_on(design) && predicates.any(|predicate| self.holds(&format!("{predicate} {design}")))
     }
 
-    /// Replaces the available designs of a filled problem and returns the domain for that problem. If no
-    /// predicate of the domain expresses availability, the problem is unchanged.
+    /// Replaces the available designs of a filled problem and returns the domain for that problem. All predicates
+    /// that are bound to availability change. If there is none, the problem is unchanged.
     ///
     /// `allowed` is called with the name of each design of the knowledge base and its current
     /// availability; the design becomes available if the result is `true`. Designs whose
@@ -170,14 +165,14 @@ impl Mission {
             .filter(|(design, available)| allowed(design, *available))
             .map(|(design, _)| design)
             .collect();
-        let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
-        if let Some(predicate) = declared.into_iter().find(|name| self.bindings.is_availability(name)) {
+        let declared = self.domain.predicates.iter().filter(|declared| declared.parameters.len() == 1);
+        let names = declared.map(|declared| &declared.identifier.name);
+        for predicate in names.filter(|name| self.bindings.is_availability(name)) {
             let decides = |atom: &Atom| atom.arguments.iter().any(|term| self.own.contains(term.name()));
             let is_known = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate && !decides(atom));
             problem.init.retain(|element| !is_known(element));
-            let facts =
-                allowed.iter().map(|design| InitialElement::Fact(binding::atom(predicate, &[design])));
-            problem.init.extend(facts);
+            let fact = |design: &&str| InitialElement::Fact(binding::atom(predicate, &[design]));
+            problem.init.extend(allowed.iter().map(fact));
         }
         Cow::Borrowed(&self.domain)
     }
@@ -221,10 +216,8 @@ impl Mission {
         let mut problem = self.problem.clone();
         problem.goal = tree.goal;
         self.fill(&mut problem);
-        let diagnostics = pddl::check(&self.domain, &self.domain_source, &problem, &source);
-        let errors = diagnostics.into_iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
-        // Only the goal is part of this text. `filled` reports the diagnostics about the domain.
-        let errors: Vec<_> = errors.filter(|diagnostic| diagnostic.file == "goal").collect();
+        let mut errors = pddl::check_goal(&self.domain, &problem, &source);
+        errors.retain(|diagnostic| diagnostic.severity == Severity::Error);
         if errors.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&errors, &[&source]).into()) }
     }
 
@@ -258,9 +251,81 @@ impl Mission {
     }
 }
 
-fn is_named(atom: &Atom, words: &[&str]) -> bool {
-    words.split_first().is_some_and(|(symbol, arguments)| {
-        let arguments = || arguments.iter().map(|word| Name::new(word)).collect::<Vec<_>>();
-        atom.predicate.name == Name::new(symbol) && atom.arguments.iter().map(Term::name).eq(&arguments())
-    })
+fn is_named(atom: &Atom, words: &[Name]) -> bool {
+    std::iter::once(&atom.predicate.name).chain(atom.arguments.iter().map(Term::name)).eq(words)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::path::Path;
+
+    use pddl::Source;
+    use pddl::ast::InitialElement;
+
+    use crate::binding::Bindings;
+    use crate::joined::Mission;
+    use crate::knowledge::{COADAPTATION, Knowledge, Sources};
+
+    const DOMAIN: &str = "(define (domain d) (:types function functiondesign action place)
+      (:predicates (fd_available ?d - functiondesign) (usable ?d - functiondesign) (a_req_f ?a - action ?f - function)
+        (at ?p - place))
+      (:action go :parameters (?d - functiondesign ?p - place) :precondition (usable ?d) :effect (at ?p)))";
+
+    /// Mission with the knowledge base of the ground vehicle and some bindings.
+    fn mission(objects: &str, bindings: &[(&str, &str)]) -> Mission {
+        let document = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../ontology/kb/ugv.ttl");
+        let rules = vec![COADAPTATION.to_owned()];
+        let sources = Sources { documents: vec![document], rules, ..Sources::default() };
+        let bindings: BTreeMap<String, String> =
+            bindings.iter().map(|(symbol, query)| ((*symbol).to_owned(), (*query).to_owned())).collect();
+        let problem =
+            format!("(define (problem p) (:domain d) (:objects {objects}) (:init) (:goal (at here)))");
+        Mission::new(
+            "ugv",
+            Some(Knowledge::read(&sources)),
+            Bindings::with(&bindings).expect("bindings"),
+            Ok(Source::new("domain", DOMAIN)),
+            Ok(Source::new("problem", problem)),
+        )
+        .unwrap_or_else(|errors| panic!("{errors}"))
+    }
+
+    #[test]
+    fn all_predicates_for_availability_change() {
+        let mission = mission("here - place", &[("usable", "available")]);
+        let mut problem = mission.current().as_ref().clone();
+        let mut available = |allowed: &dyn Fn(&str, bool) -> bool| {
+            mission.allow(&mut problem, allowed);
+            ["fd_available", "usable"].map(|predicate| {
+                let is_fact = |element: &&InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name.as_str() == predicate);
+                problem.init.iter().filter(is_fact).count()
+            })
+        };
+        let [first, second] = available(&|_, _| true);
+        assert!(first > 1 && first == second, "{first} {second}");
+        assert_eq!(available(&|design, _| design == "fd_amcl_lidar"), [1, 1]);
+        assert_eq!(available(&|_, _| false), [0, 0]);
+    }
+
+    /// Only the errors of a goal are reported with the positions of its text.
+    #[test]
+    fn errors_of_the_problem_are_not_errors_of_a_goal() {
+        let mission = mission("here - place there - nowhere", &[]);
+        assert!(mission.filled().is_err());
+        assert!(mission.goal("(at here)").is_ok());
+        let errors = mission.goal("(at elsewhere)").expect_err("an unknown object");
+        assert!(errors.to_string().contains("elsewhere"), "{errors}");
+    }
+
+    #[test]
+    fn a_binding_that_is_used_is_not_idle() {
+        let idle = |query: &str| {
+            let doubts = mission("here - place", &[("a_req_f", query)]).doubts();
+            let is_idle = doubts.iter().any(|message| message.code == "M227");
+            assert!(doubts.iter().all(|message| !message.is_error()));
+            is_idle
+        };
+        assert_eq!(["requires:A_Move", "requires:a_move", "requires:fly"].map(idle), [false, false, true]);
+    }
 }

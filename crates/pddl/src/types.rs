@@ -1,6 +1,6 @@
 //! Type hierarchy of a domain.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::{Domain, Name, TypeExpression};
 
@@ -10,18 +10,20 @@ use super::ast::{Domain, Name, TypeExpression};
 pub struct TypeHierarchy {
     index: FxHashMap<Name, usize>,
     parents: Vec<Vec<usize>>,
+    children: Vec<Vec<usize>>,
 }
 
 impl TypeHierarchy {
     /// Builds the hierarchy of a domain's types.
     pub fn of(domain: &Domain) -> Self {
-        let mut hierarchy = Self { index: FxHashMap::default(), parents: Vec::new() };
+        let mut hierarchy = Self { index: FxHashMap::default(), parents: Vec::new(), children: Vec::new() };
         hierarchy.insert(&Name::new("object"));
         for entry in &domain.types {
             let child = hierarchy.insert(&entry.identifier.name);
             for parent in &entry.r#type.alternatives {
                 let parent = hierarchy.insert(&parent.name);
                 hierarchy.parents[child].push(parent);
+                hierarchy.children[parent].push(child);
             }
         }
         hierarchy
@@ -34,6 +36,7 @@ impl TypeHierarchy {
         }
         self.index.insert(name.clone(), self.parents.len());
         self.parents.push(Vec::new());
+        self.children.push(Vec::new());
         self.parents.len() - 1
     }
 
@@ -58,7 +61,7 @@ impl TypeHierarchy {
     }
 
     fn reaches(&self, lower: usize, upper: usize) -> bool {
-        lower == upper || closure(&self.parents, lower)[upper]
+        lower == upper || closure(&self.parents, lower).contains(&upper)
     }
 
     /// Returns `true` if an object of type `subtype` is also of type `supertype`. With `either`, one matching
@@ -91,14 +94,7 @@ impl TypeHierarchy {
 
     fn have_common_subtype(&self, left: &Name, right: &Name) -> bool {
         let (Some(left), Some(right)) = (self.index.get(left), self.index.get(right)) else { return true };
-        let mut children = vec![Vec::new(); self.parents.len()];
-        for (child, parents) in self.parents.iter().enumerate() {
-            for parent in parents {
-                children[*parent].push(child);
-            }
-        }
-        let (below_left, below_right) = (closure(&children, *left), closure(&children, *right));
-        below_left.iter().zip(&below_right).any(|(left, right)| *left && *right)
+        !closure(&self.children, *left).is_disjoint(&closure(&self.children, *right))
     }
 
     /// Returns `true` if a type is its own supertype through at least one other type. A supertype of `object`, to which
@@ -110,16 +106,10 @@ impl TypeHierarchy {
     }
 }
 
-fn closure(links: &[Vec<usize>], from: usize) -> Vec<bool> {
-    let mut reached = vec![false; links.len()];
-    reached[from] = true;
-    let mut open = vec![from];
+fn closure(links: &[Vec<usize>], from: usize) -> FxHashSet<usize> {
+    let (mut reached, mut open) = (FxHashSet::from_iter([from]), vec![from]);
     while let Some(at) = open.pop() {
-        for next in &links[at] {
-            if !std::mem::replace(&mut reached[*next], true) {
-                open.push(*next);
-            }
-        }
+        open.extend(links[at].iter().filter(|next| reached.insert(**next)));
     }
     reached
 }

@@ -2,7 +2,7 @@
 
 use num_rational::BigRational;
 
-use metaplan_pddl::validate::{Options, PlanText, Verdict, validate};
+use metaplan_pddl::validate::{Options, PlanText, Verdict, validate, validate_within};
 use metaplan_pddl::{Source, ast, read, render};
 
 fn parse(domain: &str, problem: &str) -> (ast::Domain, ast::Problem) {
@@ -291,4 +291,40 @@ fn lines_that_are_not_steps_are_reported() {
     5:1 `x` is not a number
     6:1 the name of the action is missing
     ");
+}
+
+/// A quantified variable may have the name of a parameter. It has no single value then.
+#[test]
+fn a_shadowed_parameter_has_no_value_in_an_explanation() {
+    let task = parse(
+        "(define (domain d) (:types place) (:functions (n ?x - place))
+         (:action go :parameters (?x - place) :precondition (forall (?x - place) (<= (n ?x) 1)) :effect ()))",
+        "(define (problem p) (:domain d) (:objects a b - place) (:init (= (n a) 0) (= (n b) 7)) (:goal (and)))",
+    );
+    check(&task, &[("(go a)", "1 at_start (forall (?x - place) (<= (n ?x) 1))")]);
+}
+
+/// The comparison of simultaneous happenings polls the limits: it takes quadratic time.
+#[test]
+fn the_comparison_of_simultaneous_happenings_can_be_stopped() {
+    let names: Vec<String> = (0..400).map(|number| format!("o{number}")).collect();
+    let (domain, problem) = parse(
+        "(define (domain d) (:types place) (:predicates (seen ?x - place))
+         (:action see :parameters (?x - place) :precondition () :effect (seen ?x)))",
+        &format!(
+            "(define (problem p) (:domain d) (:objects {} - place) (:init) (:goal (and)))",
+            names.join(" ")
+        ),
+    );
+    let plan: Vec<String> = names.iter().map(|name| format!("0: (see {name}) [0]")).collect();
+    let plan = PlanText::parse(&Source::new("plan", plan.join("\n"))).expect("the plan can be read");
+    let options = Options::default().with_concurrent(true);
+    let polls = std::cell::Cell::new(0_u32);
+    let stop = || {
+        polls.set(polls.get() + 1);
+        false
+    };
+    assert!(validate_within(&domain, &problem, &plan, &options, &stop).expect("no limit").valid);
+    // There are 79,800 pairs.
+    assert!(polls.get() > 200, "{} polls", polls.get());
 }

@@ -31,7 +31,7 @@ pub fn same_task(
     match faithful_to(domain, problem, task, witness, stop) {
         Faithful::Yes { instances, idle, timed } => {
             let summary = format!(
-                "it represents the files: {instances} instances of actions can be executed, {idle} of which change \
+                "it represents the files: {instances} instances of actions may be executable, {idle} of which change \
                  no variable of the task"
             );
             Ok((summary, timed))

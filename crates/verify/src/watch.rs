@@ -10,8 +10,8 @@ use crate::memory;
 
 /// Upper limit on the memory of the process, in megabytes of 2^20 bytes.
 const MEMORY_LIMIT: u64 = 4096;
-/// After a limit is reached, a verification that does not end is aborted after this time plus a tenth of the time
-/// limit.
+/// A verification that does not end is aborted after this time, counted from the memory limit or from a tenth
+/// more than the time limit. Memory may grow fast, so the memory limit gives no more time.
 const GRACE: Duration = Duration::from_millis(100);
 const LATE: &str = "it takes longer than `--time-limit` allows";
 const INTERVAL: Duration = Duration::from_millis(50);
@@ -36,10 +36,11 @@ impl Watch {
         let _ = memory::watch(MEMORY_LIMIT, Arc::clone(&watch.interrupt));
         let watcher = watch.clone();
         std::thread::spawn(move || {
-            while !watcher.reached() {
+            let latest = watcher.time.saturating_add(watcher.time / 10);
+            while !watcher.interrupt.load(Ordering::Relaxed) && watcher.started.elapsed() < latest {
                 std::thread::sleep(INTERVAL);
             }
-            std::thread::sleep(watcher.time / 10 + GRACE);
+            std::thread::sleep(GRACE);
             if !watcher.answered.swap(true, Ordering::Relaxed) {
                 let reason = format!("{LATE}, or more than {MEMORY_LIMIT} MB");
                 let parts = vec![VerifiedPart { part: "limits", result: Err(reason) }];
@@ -88,6 +89,17 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_verification_with_too_much_memory_is_aborted_at_once() {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        let watch = Watch::start(Duration::from_secs(3600), move |report| {
+            let _ = sender.send(report.to_string());
+        });
+        watch.interrupt.store(true, Ordering::Relaxed);
+        let report = receiver.recv_timeout(Duration::from_secs(60)).expect("aborted");
+        assert!(report.contains("more than 4096 MB"), "{report}");
+    }
 
     #[test]
     fn nothing_is_verified_with_too_much_memory() {

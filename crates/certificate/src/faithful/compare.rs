@@ -103,7 +103,7 @@ impl<'c> Comparison<'c> {
         let world = self.task.world;
         match world.initial_value(key) {
             Some(value) => Ok(value.clone()),
-            None if *key == TOTAL_TIME || world.name(key.0) == "total-cost" => Ok(BigRational::zero()),
+            None if *key == TOTAL_TIME => Ok(BigRational::zero()),
             None => {
                 let reason = format!("{}, which has no value at first", world.show(key));
                 Err(Cause::unsupported(reason).into())

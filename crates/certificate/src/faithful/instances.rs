@@ -60,7 +60,7 @@ pub(super) fn of(
             };
             let unknown = atom.arguments.iter().filter(unknown).count();
             let connected = unknown < atom.arguments.len() || atom.arguments.is_empty();
-            let rows = world.symbol(&atom.predicate.name).map_or(0, |symbol| world.rows(symbol, None).len());
+            let rows = world.symbol(&atom.predicate.name).map_or(0, |symbol| world.count(symbol, None));
             (!connected, unknown, rows)
         };
         let best = (0..open.len()).min_by_key(|at| join_cost(open[*at])).unwrap_or(0);

@@ -414,10 +414,9 @@ impl<'r> Reader<'r> {
         }
         let initial = self.world.initial_value(&key);
         if !self.world.changes(key.0) {
-            let zero = || (self.world.name(key.0) == "total-cost").then(BigRational::zero);
-            return Ok(initial.cloned().or_else(zero).map(Linear::constant));
+            return Ok(initial.cloned().map(Linear::constant));
         }
-        if initial.is_none() && self.world.name(key.0) != "total-cost" {
+        if initial.is_none() {
             return Err(Cause::unsupported(format!(
                 "{}, which changes and has no value at first",
                 self.world.show(&key)

@@ -104,8 +104,15 @@ impl Timeline {
             return vec![Passage { from: 0, to: 0, at_start: false, at_end: false, latest: None, end }];
         }
         let mut passages = Vec::new();
+        // Phase in which an action that starts at a certain time ends.
+        let phase_of_end = |start: &BigRational| {
+            let end = start + duration;
+            self.events.partition_point(|event| event.time <= end)
+        };
         for from in self.begun..=self.events.len() {
-            for to in from..=self.events.len() {
+            let begin = if from == 0 { BigRational::zero() } else { self.time(from).clone() };
+            let last = self.over(from).map_or(self.events.len(), phase_of_end);
+            for to in phase_of_end(&begin)..=last {
                 for at_start in [false, true] {
                     for at_end in [false, true] {
                         passages.extend(self.passage(duration, (from, to), (at_start, at_end)));

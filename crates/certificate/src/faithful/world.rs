@@ -4,6 +4,7 @@
 use num_rational::BigRational;
 use num_traits::Zero;
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 
 use crate::faithful::key::{CLOCK, Key, PHASE, WAITED};
 use crate::faithful::timeline::{self, Timeline};
@@ -66,7 +67,7 @@ impl<'w> World<'w> {
                 "derived predicates beside a predicate and a function of one name",
             ));
         }
-        world.intern(&Name::new("total-cost"));
+        let total_cost = (world.intern(&Name::new("total-cost")), SmallVec::new());
         for entry in domain.constants.iter().chain(&problem.objects) {
             let symbol = world.intern(&entry.identifier.name);
             let place = *world.by_name.entry(symbol).or_insert(world.objects.len());
@@ -87,6 +88,8 @@ impl<'w> World<'w> {
             let symbol = world.symbol(&rule.head.identifier.name)?;
             world.rules.entry(symbol).or_default().push(rule);
         }
+        // `total-cost` starts at 0 unless `:init` sets it.
+        world.values.insert(total_cost, BigRational::zero());
         for element in &problem.init {
             world.state(element)?;
         }
@@ -215,8 +218,11 @@ impl<'w> World<'w> {
     /// Parses an atom or fluent, including the phase, clock and `waited` of the timeline. Returns
     /// `None` if the text is malformed or a symbol is unknown.
     pub(super) fn written(&self, text: &str) -> Option<Key> {
-        let phases = 0..=self.timeline.events.len();
-        let timeline_keys = phases.map(timeline::phase).chain([timeline::waited(), timeline::clock()]);
+        let phase = || {
+            let number = text.strip_prefix("(the phase phase ")?.strip_suffix(')')?.parse().ok()?;
+            (number <= self.timeline.events.len()).then(|| timeline::phase(number))
+        };
+        let timeline_keys = phase().into_iter().chain([timeline::waited(), timeline::clock()]);
         let mut timeline_keys =
             timeline_keys.filter(|key| !self.timeline.is_empty() && self.show(key) == text);
         timeline_keys.next().or_else(|| self.of_files(text))

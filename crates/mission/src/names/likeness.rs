@@ -8,15 +8,17 @@ use diagnostics::nearest;
 /// Minimum similarity of a matched pair, on the scale from 0 to 1 of [`likeness`]. At this value, half of the words
 /// are equal.
 const ALIKE: f64 = 0.5;
+/// Maximum number of names of each list that [`pairs`] compares, because the time is quadratic.
+const COMPARED: usize = 500;
 /// Maximum number of names in a list of a message; further names are only counted.
 const SHOWN: usize = 12;
 
 /// Returns pairs of similar names, one from each list, matched greedily by descending similarity.
-/// Each name occurs in at most one pair.
+/// Each name occurs in at most one pair. Of each list, only the first 500 names are compared.
 pub(super) fn pairs<'n>(left: &[&'n str], right: &[&'n str]) -> Vec<(&'n str, &'n str)> {
     let mut candidates: Vec<(f64, usize, usize)> = Vec::new();
-    for (l, one) in left.iter().enumerate() {
-        for (r, other) in right.iter().enumerate() {
+    for (l, one) in left.iter().enumerate().take(COMPARED) {
+        for (r, other) in right.iter().enumerate().take(COMPARED) {
             let likeness = likeness(one, other);
             if likeness >= ALIKE {
                 candidates.push((likeness, l, r));

@@ -60,6 +60,14 @@ pub fn check(
     diagnostics
 }
 
+/// Checks only the goal of a problem. Returns errors and warnings.
+pub fn check_goal(domain: &Domain, problem: &Problem, source: &Source) -> Vec<Diagnostic> {
+    let symbols = Symbols::of(domain, Some(problem));
+    let mut checker = Checker::new(&symbols, source);
+    checker.goal(&problem.goal);
+    checker.sink.finish()
+}
+
 pub(super) fn objective(
     domain: &Domain,
     problem: &Problem,

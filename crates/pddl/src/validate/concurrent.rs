@@ -137,6 +137,9 @@ impl<'e, 'p> Simultaneous<'e, 'p> {
         recent.retain(|earlier| &earlier.time + &execution.options.tolerance > *time);
         for (step, Happening { footprint, .. }) in &mut self.happenings {
             for earlier in recent.iter() {
+                if execution.world.budget.is_spent() {
+                    return Ok(());
+                }
                 check_pair(execution, (*step, time, footprint), earlier)?;
             }
             recent.push(Recent { step: *step, time: time.clone(), footprint: std::mem::take(footprint) });

@@ -23,11 +23,14 @@ pub(super) fn unmet<'p>(
     if evaluator.holds(condition, bindings) == Ok(true) {
         return Vec::new();
     }
+    let mut ground = condition.clone();
+    substitute(&mut ground, evaluator.world, bindings, &mut Vec::new());
     let mut functions = Vec::new();
-    condition.walk_fluents(&mut |atom| functions.push(atom));
+    ground.walk_fluents(&mut |atom| functions.push(atom));
     let mut values: Vec<(String, Option<BigRational>)> = Vec::new();
     for function in functions {
-        let Some(arguments) = evaluator.arguments(function, bindings) else { continue };
+        // Only quantified variables are left.
+        let Some(arguments) = evaluator.arguments(function, &Bindings::default()) else { continue };
         let symbol = evaluator.world.symbol(&function.predicate.name);
         let text = evaluator.world.show(symbol, &arguments);
         // A function can occur several times in a condition.
@@ -35,8 +38,6 @@ pub(super) fn unmet<'p>(
             values.push((text, evaluator.state.values.get(&(symbol, arguments)).cloned()));
         }
     }
-    let mut ground = condition.clone();
-    substitute(&mut ground, evaluator.world, bindings, &mut Vec::new());
     vec![Unmet { condition: condition_text(&ground), values }]
 }
 

@@ -220,7 +220,7 @@ fn read_through_axioms(world: &World<'_>, read: Vec<&Name>, into: &mut Footprint
         if !visited.insert(name) {
             continue;
         }
-        for axiom in world.domain.derived.iter().filter(|axiom| axiom.head.identifier.name == *name) {
+        for axiom in world.axioms.get(name).into_iter().flatten() {
             uses_of_condition(&axiom.condition, &mut Vec::new(), &mut |usage, _| {
                 let (Use::Fact(atom) | Use::Value(atom)) = usage;
                 let pattern = Pattern { symbol: world.symbol(&atom.predicate.name), arguments: None };

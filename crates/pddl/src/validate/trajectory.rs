@@ -125,20 +125,26 @@ impl<'p> TrajectoryEvaluator<'_, 'p> {
             }
             Trajectory::SometimeAfter(first, second) => {
                 let (first, second) = (self.holds(first, bindings), self.holds(second, bindings));
-                (0..first.len()).all(|i| !first[i] || second[i..].contains(&true))
+                let last = second.iter().rposition(|holds| *holds);
+                (0..first.len()).all(|i| !first[i] || Some(i) <= last)
             }
             Trajectory::SometimeBefore(first, second) => {
                 let (first, second) = (self.holds(first, bindings), self.holds(second, bindings));
                 // Strictly before: the state itself does not count.
-                (0..first.len()).all(|i| !first[i] || second[..i].contains(&true))
+                let earliest = second.iter().position(|holds| *holds);
+                (0..first.len()).all(|i| !first[i] || earliest.is_some_and(|earliest| earliest < i))
             }
             Trajectory::Within(time, body) => {
                 self.holds(body, bindings).iter().zip(times).any(|(holds, reached)| *holds && reached <= time)
             }
             Trajectory::AlwaysWithin(time, first, second) => {
                 let (first, second) = (self.holds(first, bindings), self.holds(second, bindings));
-                let soon = |i: usize| (i..second.len()).any(|j| second[j] && times[j] - times[i] <= *time);
-                (0..first.len()).all(|i| !first[i] || soon(i))
+                // Time of the next state, from state `i` on, in which the second condition holds.
+                let mut next = None;
+                (0..first.len()).rev().all(|i| {
+                    next = if second[i] { Some(times[i]) } else { next };
+                    !first[i] || next.is_some_and(|next| next - times[i] <= *time)
+                })
             }
             Trajectory::HoldDuring(from, until, body) => {
                 let holds = self.holds(body, bindings);

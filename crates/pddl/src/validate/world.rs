@@ -5,7 +5,9 @@ use num_traits::Zero;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
-use crate::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, TypeExpression, TypedName};
+use crate::ast::{
+    Atom, Derived, Domain, Identifier, InitialElement, Name, Problem, Span, TypeExpression, TypedName,
+};
 use crate::number::dense;
 use crate::types::TypeHierarchy;
 
@@ -35,6 +37,8 @@ pub(super) struct World<'p> {
     position: FxHashMap<Symbol, usize>,
     members: FxHashMap<Name, (Vec<Symbol>, FxHashSet<Symbol>)>,
     pub(super) strata: Vec<Stratum<'p>>,
+    /// Axioms of each derived predicate.
+    pub(super) axioms: FxHashMap<&'p Name, Vec<&'p Derived>>,
     pub(super) read_by_axioms: FxHashSet<Symbol>,
     changeable: FxHashSet<Symbol>,
     /// Facts of the fixed predicates, which no plan changes, indexed by argument position and object.
@@ -63,10 +67,14 @@ impl<'p> World<'p> {
             position: FxHashMap::default(),
             members: FxHashMap::default(),
             strata: strata(domain),
+            axioms: FxHashMap::default(),
             read_by_axioms: FxHashSet::default(),
             changeable: FxHashSet::default(),
             fixed: FxHashMap::default(),
         };
+        for axiom in &domain.derived {
+            world.axioms.entry(&axiom.head.identifier.name).or_default().push(axiom);
+        }
         // `total-cost` may be used without a declaration.
         world.intern(&Name::new("total-cost"));
         for declaration in domain.predicates.iter().chain(&domain.functions) {

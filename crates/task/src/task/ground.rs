@@ -356,19 +356,24 @@ impl<N: TaskNumber> Operator<N> {
             && self.condition.holds_numerically(&state.numbers, choice, &self.sizes())
     }
 
-    /// Applies the effects of the operator to `next`, which must initially equal `state`. Derived variables
-    /// are not updated. Returns `None` on numeric overflow.
-    pub fn apply(&self, state: &State<N>, choice: &[u32], next: &mut State<N>) -> Option<()> {
+    /// Applies the propositional effects of the operator to `next`, which must initially equal `values`.
+    pub fn apply_propositionally(&self, values: &[u32], next: &mut [u32]) {
         for effect in &self.effects {
-            next.values[effect.variable.index()] = effect.value;
+            next[effect.variable.index()] = effect.value;
         }
         for conditional in &self.conditional {
-            if conditional.condition.iter().all(|literal| literal.holds(&state.values)) {
+            if conditional.condition.iter().all(|literal| literal.holds(values)) {
                 for effect in &conditional.effects {
-                    next.values[effect.variable.index()] = effect.value;
+                    next[effect.variable.index()] = effect.value;
                 }
             }
         }
+    }
+
+    /// Applies the effects of the operator to `next`, which must initially equal `state`. Derived variables
+    /// are not updated. Returns `None` on numeric overflow.
+    pub fn apply(&self, state: &State<N>, choice: &[u32], next: &mut State<N>) -> Option<()> {
+        self.apply_propositionally(&state.values, &mut next.values);
         if !self.numeric_effects.is_empty() {
             let sizes = self.sizes();
             for effect in &self.numeric_effects {

@@ -46,7 +46,8 @@ pub(super) fn makespan_bound<T: TimeNumber>(concurrent: &TemporalTask<T>, limits
     let mut by_schemas: BTreeMap<Vec<u32>, Vec<Resource>> = BTreeMap::new();
     let mut by_size: BTreeMap<(Vec<u32>, usize), Vec<Resource>> = BTreeMap::new();
     // A resource for a single instance bounds no more than the duration of this instance.
-    for resource in resources(concurrent).into_iter().filter(|resource| resource.instances.len() > 1) {
+    for resource in resources(concurrent, limits).into_iter().filter(|resource| resource.instances.len() > 1)
+    {
         let schema = |instance: &u32| {
             let start = concurrent.instances[*instance as usize].start;
             concurrent.task.operators[start.index()].schema
@@ -134,7 +135,8 @@ fn without_costs<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Task {
     task
 }
 
-fn resources<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Vec<Resource> {
+/// Returns the exclusive resources that are found before a limit is reached.
+fn resources<T: TimeNumber>(concurrent: &TemporalTask<T>, limits: &Limits) -> Vec<Resource> {
     let task = &concurrent.task;
     let mut setters: Vec<Vec<OperatorId>> = vec![Vec::new(); task.basic];
     for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
@@ -149,7 +151,8 @@ fn resources<T: TimeNumber>(concurrent: &TemporalTask<T>) -> Vec<Resource> {
         }
     }
     let ids = VariableId::all(task.basic);
-    ids.zip(setters).filter_map(|(variable, setters)| resource(concurrent, variable, &setters)).collect()
+    let resource = |(variable, setters): (_, Vec<_>)| resource(concurrent, variable, &setters, limits);
+    ids.zip(setters).filter_map(resource).collect()
 }
 
 fn effects(operator: &Operator) -> impl Iterator<Item = Fact> {
@@ -166,11 +169,12 @@ fn value_in(facts: &[Fact], variable: VariableId) -> Option<u32> {
 }
 
 /// Returns a variable as a resource; `setters` are the operators that set the variable. Returns `None` if no
-/// set of busy values that satisfies the definition is found.
+/// set of busy values that satisfies the definition is found, or if a limit is reached.
 fn resource<T: TimeNumber>(
     concurrent: &TemporalTask<T>,
     variable: VariableId,
     setters: &[OperatorId],
+    limits: &Limits,
 ) -> Option<Resource> {
     let operators = &concurrent.task.operators;
     let role = |id: OperatorId| concurrent.happenings[id.index()].role;
@@ -213,7 +217,7 @@ fn resource<T: TimeNumber>(
             // The operator may leave any value, so no value is busy.
             None => return None,
         };
-        if busy.is_empty() {
+        if busy.is_empty() || limits.reached() {
             return None;
         }
     }

@@ -3,6 +3,7 @@
 
 use num_traits::One;
 use pddl::to_decimal;
+use task::limits::{Interrupted, Limits};
 use task::number::Rational;
 use task::plan::{Plan, Step};
 
@@ -26,24 +27,30 @@ pub(super) struct Answer {
 /// Minimises, in this order: metric, makespan, sum of durations, sum of the times of all happenings.
 /// A metric without a minimum is skipped. Durations that are no decimals are then rounded to decimals if [`rounded`]
 /// succeeds, even if that increases the metric slightly.
-pub(super) fn answer(concurrent: &TemporalTask, course: &Course) -> Option<Answer> {
+pub(super) fn answer(
+    concurrent: &TemporalTask,
+    course: &Course,
+    limits: &Limits,
+) -> Result<Option<Answer>, Interrupted> {
+    let Some(goal) = course.goal(concurrent) else { return Ok(None) };
     let mut program = course.program.clone();
-    if !program.constrain(&course.goal(concurrent)?) {
-        return None;
+    if !program.constrain(&goal, limits)? {
+        return Ok(None);
     }
     let value = course.value_of_plan(concurrent);
     let durations: Vec<Affine> =
         course.chosen(concurrent).map(|position| Affine::column(duration_of(position))).collect();
-    let exact = best(&program, &[&value, &Affine::column(MAKESPAN), &sum(&durations)]);
+    let exact = best(&program, &[&value, &Affine::column(MAKESPAN), &sum(&durations)], limits)?;
     let least = exact.value(&value);
-    let fixed = fix(&exact, &durations);
+    let fixed = fix(&exact, &durations, limits)?;
     let is_decimal = durations.iter().all(|duration| is_decimal(concurrent, &exact.value(duration)));
-    let rounded = if is_decimal { None } else { rounded(concurrent, &program, &value, &durations) };
+    let rounded =
+        if is_decimal { None } else { rounded(concurrent, &program, (&value, &durations), limits)? };
     let times: Vec<Affine> = course.passed.iter().map(|passed| passed.time.clone()).collect();
-    let program = best(&rounded.unwrap_or(fixed), &[&Affine::column(MAKESPAN), &sum(&times)]);
+    let program = best(&rounded.unwrap_or(fixed), &[&Affine::column(MAKESPAN), &sum(&times)], limits)?;
     let at = |expression: &Affine| program.value(expression);
     let value = at(&value);
-    Some(Answer { plan: in_names(concurrent, course, &value, &at), value, least })
+    Ok(Some(Answer { plan: in_names(concurrent, course, &value, &at), value, least }))
 }
 
 fn sum(expressions: &[Affine]) -> Affine {
@@ -52,28 +59,28 @@ fn sum(expressions: &[Affine]) -> Affine {
 
 /// Optimises several objectives lexicographically, the most important first. An objective without a
 /// minimum is skipped. Returns the program, constrained to the optimum of each objective.
-fn best(program: &Program, objectives: &[&Affine]) -> Program {
+fn best(program: &Program, objectives: &[&Affine], limits: &Limits) -> Result<Program, Interrupted> {
     let mut best = program.clone();
     for objective in objectives {
         let mut next = best.clone();
-        if next.minimise(objective) {
+        if next.minimise(objective, limits)? {
             let slack = Affine::constant(next.least().clone()).minus(objective);
-            if next.constrain([&slack]) {
+            if next.constrain([&slack], limits)? {
                 best = next;
             }
         }
     }
-    best
+    Ok(best)
 }
 
-fn fix(program: &Program, durations: &[Affine]) -> Program {
+fn fix(program: &Program, durations: &[Affine], limits: &Limits) -> Result<Program, Interrupted> {
     let mut fixed = program.clone();
     for duration in durations {
         let value = Affine::constant(program.value(duration));
-        let is_feasible = fixed.constrain(&[value.minus(duration), duration.minus(&value)]);
+        let is_feasible = fixed.constrain(&[value.minus(duration), duration.minus(&value)], limits)?;
         debug_assert!(is_feasible, "an optimum has values");
     }
-    fixed
+    Ok(fixed)
 }
 
 /// Returns `true` if a time, converted to PDDL time units, has a finite decimal expansion.
@@ -89,24 +96,30 @@ fn is_decimal(concurrent: &TemporalTask, time: &Rational) -> bool {
 fn rounded(
     concurrent: &TemporalTask,
     program: &Program,
-    value: &Affine,
-    durations: &[Affine],
-) -> Option<Program> {
-    let grain = grain(concurrent)?;
-    let mut rounded = best(program, &[]);
+    (value, durations): (&Affine, &[Affine]),
+    limits: &Limits,
+) -> Result<Option<Program>, Interrupted> {
+    let Some(grain) = grain(concurrent) else { return Ok(None) };
+    let mut rounded = program.clone();
     for duration in durations {
-        let exact = best(&rounded, &[value, &Affine::column(MAKESPAN)]).value(duration);
+        let exact = best(&rounded, &[value, &Affine::column(MAKESPAN)], limits)?.value(duration);
         let low = Rational::from_big((exact.clone() / grain.clone()).to_big().floor()) * &grain;
         let near = if is_decimal(concurrent, &exact) { vec![exact] } else { vec![low.clone() + &grain, low] };
-        let with = |candidate: &Rational| {
-            let value = Affine::constant(candidate.clone());
+        let mut feasible: Option<(Rational, Program)> = None;
+        for candidate in near {
+            let candidate = Affine::constant(candidate);
             let mut with = rounded.clone();
-            with.constrain(&[value.minus(duration), duration.minus(&value)]).then_some(with)
-        };
-        let worth = |with: &Program| best(with, &[value]).value(value);
-        rounded = near.iter().filter_map(with).min_by_key(worth)?;
+            if with.constrain(&[candidate.minus(duration), duration.minus(&candidate)], limits)? {
+                let worth = best(&with, &[value], limits)?.value(value);
+                if feasible.as_ref().is_none_or(|(least, _)| worth < *least) {
+                    feasible = Some((worth, with));
+                }
+            }
+        }
+        let Some((_, with)) = feasible else { return Ok(None) };
+        rounded = with;
     }
-    Some(rounded)
+    Ok(Some(rounded))
 }
 
 /// Granularity of rounded durations, in internal time units: the greatest 10^-n PDDL time units (n

@@ -9,6 +9,7 @@
 //! simplex method, Mathematics of Operations Research 2, 1977.
 
 use num_traits::Zero;
+use task::limits::{Interrupted, Limits};
 use task::number::Rational;
 
 use crate::concurrent::flexible_durations::affine::{Affine, Column};
@@ -44,12 +45,16 @@ impl Program {
     }
 
     /// Adds the constraints that each expression is at least 0, and reoptimises. Returns `false` if
-    /// the constraints are infeasible; the program must not be used then.
-    pub(super) fn constrain<'e>(&mut self, expressions: impl IntoIterator<Item = &'e Affine>) -> bool {
+    /// the constraints are infeasible; the program must not be used then, nor after an interruption.
+    pub(super) fn constrain<'e>(
+        &mut self,
+        expressions: impl IntoIterator<Item = &'e Affine>,
+        limits: &Limits,
+    ) -> Result<bool, Interrupted> {
         for expression in expressions {
             let row = self.reduced(expression);
             match row.known() {
-                Some(value) if value.is_negative() => return false,
+                Some(value) if value.is_negative() => return Ok(false),
                 Some(_) => {}
                 None => {
                     self.rows.push((self.slacks, row));
@@ -57,17 +62,19 @@ impl Program {
                 }
             }
         }
-        self.mend()
+        self.mend(limits)
     }
 
     /// Minimises another objective by the primal simplex algorithm. Returns `false` if the
     /// objective is unbounded below.
-    pub(super) fn minimise(&mut self, objective: &Affine) -> bool {
+    pub(super) fn minimise(&mut self, objective: &Affine, limits: &Limits) -> Result<bool, Interrupted> {
         self.objective = self.reduced(objective);
+        let mut pulse = limits.pulse();
         loop {
+            pulse.beat()?;
             // Bland's rule takes the first eligible column, which prevents cycling.
             let entering = self.objective.terms.iter().find(|(_, factor)| factor.is_negative());
-            let Some((entering, _)) = entering.cloned() else { return true };
+            let Some((entering, _)) = entering.cloned() else { return Ok(true) };
             let mut leaving: Option<(Rational, Column)> = None;
             for (column, row) in &self.rows {
                 if let Some(factor) = row.coefficient(entering).filter(|factor| factor.is_negative()) {
@@ -77,7 +84,7 @@ impl Program {
                     }
                 }
             }
-            let Some((_, leaving)) = leaving else { return false };
+            let Some((_, leaving)) = leaving else { return Ok(false) };
             self.pivot(leaving, entering);
         }
     }
@@ -97,10 +104,12 @@ impl Program {
 
     /// Restores feasibility by the dual simplex algorithm. Returns `false` if no feasible solution
     /// exists.
-    fn mend(&mut self) -> bool {
+    fn mend(&mut self, limits: &Limits) -> Result<bool, Interrupted> {
+        let mut pulse = limits.pulse();
         loop {
+            pulse.beat()?;
             let broken = self.rows.iter().find(|(_, row)| row.constant.is_negative());
-            let Some((leaving, row)) = broken else { return true };
+            let Some((leaving, row)) = broken else { return Ok(true) };
             let leaving = *leaving;
             let mut entering: Option<(Rational, Column)> = None;
             for (column, factor) in row.terms.iter().filter(|(_, factor)| factor.is_positive()) {
@@ -110,7 +119,7 @@ impl Program {
                     entering = Some((ratio, *column));
                 }
             }
-            let Some((_, entering)) = entering else { return false };
+            let Some((_, entering)) = entering else { return Ok(false) };
             self.pivot(leaving, entering);
         }
     }
@@ -183,6 +192,16 @@ mod tests {
         best
     }
 
+    #[test]
+    fn a_limit_interrupts_the_simplex_algorithms() {
+        let limits = Limits::none();
+        let mut program = Program::new(affine(0, [1, 1]));
+        assert_eq!(program.constrain(&[affine(-3, [1, 2])], &limits), Ok(true));
+        limits.interrupt().store(true, std::sync::atomic::Ordering::Relaxed);
+        assert!(program.clone().constrain(&[affine(-3, [2, 1])], &limits).is_err());
+        assert!(program.minimise(&affine(0, [2, 1]), &limits).is_err());
+    }
+
     proptest! {
         #[test]
         fn the_simplex_optimum_equals_the_best_corner(
@@ -194,12 +213,13 @@ mod tests {
             let objective = affine(1, costs);
             let mut program = Program::new(objective.clone());
             // Constraints are added one by one, so that each step starts from the last optimum.
-            let holds = constraints.iter().all(|constraint| program.constrain([constraint]));
+            let limits = Limits::none();
+            let holds = constraints.iter().all(|constraint| program.constrain([constraint], &limits).expect("no limit"));
             let optimum = holds.then(|| program.least().clone());
             prop_assert_eq!(optimum, least(&constraints, &objective));
             if holds {
                 let second_objective = affine(0, others);
-                let bounded = program.minimise(&second_objective);
+                let bounded = program.minimise(&second_objective, &limits).expect("no limit");
                 if bounded {
                     prop_assert_eq!(Some(program.least().clone()), least(&constraints, &second_objective));
                     prop_assert_eq!(program.value(&second_objective), program.least().clone());

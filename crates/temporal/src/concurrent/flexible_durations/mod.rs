@@ -204,3 +204,34 @@ fn shortest(
         record.improve(&value, steps, lower.clone(), figures.found_by.unwrap_or(part));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use pddl::Source;
+    use task::ground::GroundConfig;
+    use task::limits::Limits;
+    use task::number::Rational;
+
+    use crate::concurrent::{ground_concurrent, optimize_concurrent};
+
+    /// Numbers in sequences have any size. A large one makes no plan infeasible.
+    #[test]
+    fn large_numbers_make_no_plan_infeasible() {
+        let domain = "(define (domain d) (:predicates (p) (g)) (:functions (m) (n) (charge))
+          (:durative-action load :parameters () :duration (and (>= ?duration 1) (<= ?duration 9)) :condition ()
+            :effect (and (at end (p)) (at end (increase (charge) ?duration))
+              (at end (assign (n) (* (m) 10000000000000000000000000)))))
+          (:durative-action go :parameters () :duration (= ?duration 1) :condition (at start (p))
+            :effect (and (at end (g)) (at end (increase (m) 1)))))";
+        let problem = "(define (problem p) (:domain d)
+          (:init (= (m) 100000000000000000000) (= (n) 0) (= (charge) 0))
+          (:goal (and (>= (charge) 3) (>= (n) 1) (g))) (:metric minimize (total-time)))";
+        let read = pddl::read(&Source::new("domain", domain), &Source::new("problem", problem));
+        let (domain, problem, _) = read.expect("PDDL");
+        let separation = Rational::from_integer(1).to_big() / Rational::from_integer(1000).to_big();
+        let task =
+            ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+        let solution = optimize_concurrent(&task, &Limits::none(), &mut |_| {});
+        assert!(solution.plan.is_some(), "{:?}", solution.status);
+    }
+}

@@ -11,6 +11,7 @@
 //! \[2\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric
 //! change, JAIR 44, 2012.
 
+use task::limits::{Interrupted, Limits};
 use task::number::{Int, Rational, dense};
 use task::task::number::TaskNumber;
 use task::task::quantity::Linear;
@@ -78,7 +79,7 @@ pub(super) struct Course {
     /// Time of the last timed initial literals that have taken place, or -1.
     floor: Int,
     /// Sum of the costs of the happenings, in the task's cost unit.
-    pub(super) cost: Int,
+    pub(super) cost: Rational,
     pub(super) program: Program,
 }
 
@@ -96,7 +97,7 @@ impl Course {
             passed: Vec::new(),
             ranges: Vec::new(),
             floor: -1,
-            cost: 0,
+            cost: rational(0),
             program: Program::new(Affine::column(MAKESPAN)),
         }
     }
@@ -109,8 +110,13 @@ impl Course {
             let bytes = passed.time.bytes().saturating_add(passed.duration.bytes());
             bytes.saturating_add(passed.measured.bytes()).saturating_add(size_of::<Passed>())
         });
-        let fixed_size = size_of_val(&self.values[..]).saturating_add(self.program.bytes());
-        numbers.chain(times).fold(fixed_size, usize::saturating_add)
+        let runs = self.opens.iter().map(|open| {
+            let expressions = [Some(&open.end), open.number.as_ref(), open.last.as_ref()];
+            expressions.into_iter().flatten().map(Affine::bytes).fold(0, usize::saturating_add)
+        });
+        let fixed_size = size_of_val(&self.values[..]).saturating_add(size_of_val(&self.ranges[..]));
+        let fixed_size = fixed_size.saturating_add(self.program.bytes());
+        numbers.chain(times).chain(runs).fold(fixed_size, usize::saturating_add)
     }
 
     /// Current propositional state. Its numbers are the initial ones, because the actual values are
@@ -151,41 +157,54 @@ impl Course {
     }
 
     /// Returns the partial plan after a happening. `run` identifies the run if the happening is an
-    /// end. Returns `None` if the happening is not applicable, if no times and durations satisfy the
-    /// constraints, or if a number or the cost overflows.
+    /// end. Returns `None` if the happening is not applicable, or if no times and durations satisfy the
+    /// constraints.
     pub(super) fn after(
         &self,
         concurrent: &TemporalTask,
+        happening: (OperatorId, u32),
+        limits: &Limits,
+    ) -> Result<Option<Self>, Interrupted> {
+        let Some((mut next, constraints)) = self.extended(concurrent, happening) else { return Ok(None) };
+        if !next.program.constrain(&constraints, limits)? {
+            return Ok(None);
+        }
+        // Once the program minimises the metric itself, its optimum is a lower bound for every
+        // continuation.
+        if concurrent.is_whole && !concurrent.task.objective.rest.is_empty() {
+            let is_bounded = next.program.minimise(&next.value_of_plan(concurrent), limits)?;
+            debug_assert!(is_bounded, "what only grows has a least value");
+        }
+        Ok(Some(next))
+    }
+
+    /// Returns the partial plan after a happening, and the constraints that its program must still get. Returns
+    /// `None` if the happening is not applicable, or if a constraint is certainly violated.
+    fn extended(
+        &self,
+        concurrent: &TemporalTask,
         (operator, run): (OperatorId, u32),
-    ) -> Option<Self> {
+    ) -> Option<(Self, Vec<Affine>)> {
         let role = concurrent.happenings[operator.index()].role;
         if !self.admits(concurrent, (operator, run), role) {
             return None;
         }
-        let state = self.state(concurrent);
         let schema = &concurrent.task.operators[operator.index()];
-        let mut after = concurrent.task.successor(schema, &state, &[])?;
+        let mut after = self.state(concurrent);
+        schema.apply_propositionally(&self.values, &mut after.values);
+        concurrent.task.evaluate_axioms(&mut after);
         if let Role::End(instance) = role
             && self.runs(instance) == 1
         {
             concurrent.end_last_run(instance, &mut after);
         }
-        let mut next =
-            Self { values: after.values, cost: self.cost.checked_add(schema.cost.constant)?, ..self.clone() };
+        let mut next = Self { values: after.values, ..self.clone() };
+        next.cost += rational(schema.cost.constant);
         let mut constraints = Vec::new();
         next.count(concurrent, (operator, run), role, &mut constraints)?;
         next.pass(concurrent, (operator, run), role, &mut constraints)?;
         next.keep_up(concurrent, operator, role, &mut constraints)?;
-        if !next.program.constrain(&constraints) {
-            return None;
-        }
-        // Once the program minimises the metric itself, its optimum is a lower bound for every
-        // continuation.
-        if concurrent.is_whole && !concurrent.task.objective.rest.is_empty() {
-            let is_bounded = next.program.minimise(&next.value_of_plan(concurrent));
-            debug_assert!(is_bounded, "what only grows has a least value");
-        }
-        Some(next)
+        Some((next, constraints))
     }
 
     /// Returns `true` if a happening is applicable, ignoring numeric conditions, over-all conditions
@@ -436,7 +455,7 @@ impl Course {
     pub(super) fn value_of_plan(&self, concurrent: &TemporalTask) -> Affine {
         let measure = &concurrent.measure;
         let whole = Affine::column(MAKESPAN).times(&rational(measure.time));
-        let whole = whole.shifted(&(rational(self.cost) * rational(measure.cost)));
+        let whole = whole.shifted(&(self.cost.clone() * rational(measure.cost)));
         whole.plus(&self.measured(concurrent), &rational(measure.cost))
     }
 

@@ -13,7 +13,7 @@ use std::hash::{Hash, Hasher};
 use num_traits::ToPrimitive;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use search::search::SearchStatistics;
-use task::limits::Limits;
+use task::limits::{Interrupted, Limits};
 use task::number::{Int, Rational, dense};
 use task::task::OperatorId;
 use task::task::quantity::Linear;
@@ -110,23 +110,34 @@ impl<'a> Search<'a> {
     /// Searches for a plan that is better than the incumbent `best`, which it replaces. Takes at most
     /// `work` entries from the queues.
     pub(super) fn run(&mut self, best: &mut Option<Answer>, limits: &Limits, work: u64) -> Outcome {
-        if self.nodes.is_empty()
-            && let Some(outcome) = self.take_up(Course::new(self.concurrent), best)
-        {
-            return outcome;
+        if self.nodes.is_empty() {
+            match self.take_up(Course::new(self.concurrent), best, limits) {
+                Ok(None) => {}
+                Ok(Some(outcome)) => return outcome,
+                Err(Interrupted) => return Outcome::Stopped,
+            }
         }
         let mut pulse = limits.pulse();
         for _ in 0..work {
             if pulse.beat().is_err() || self.is_full(limits) {
                 return Outcome::Stopped;
             }
-            let Some((least, parent, operator)) = self.pop() else { return Outcome::Exhausted };
-            if best.as_ref().is_some_and(|best| is_lost(self.concurrent, &least, best)) {
+            let Some(entry) = self.pop() else { return Outcome::Exhausted };
+            let Reverse((_, least, _, _, parent, operator)) = &entry;
+            if best.as_ref().is_some_and(|best| is_lost(self.concurrent, least, best)) {
                 continue;
             }
-            let Some(course) = self.nodes[parent as usize].after(self.concurrent, operator) else { continue };
-            if let Some(outcome) = self.take_up(course, best) {
-                return outcome;
+            let course = self.nodes[*parent as usize].after(self.concurrent, *operator, limits);
+            match course
+                .and_then(|course| course.map_or(Ok(None), |course| self.take_up(course, best, limits)))
+            {
+                Ok(None) => {}
+                Ok(Some(outcome)) => return outcome,
+                Err(Interrupted) => {
+                    // The entry still counts for the lower bound.
+                    self.queues[0].push(entry);
+                    return Outcome::Stopped;
+                }
             }
         }
         Outcome::Stopped
@@ -135,16 +146,21 @@ impl<'a> Search<'a> {
     /// Evaluates a sequence and queues its successors, unless it is a duplicate, a dead end or no better than
     /// the incumbent `best`. Returns `Found` if the sequence is a plan that is better than `best`, which is
     /// then replaced.
-    fn take_up(&mut self, course: Course, best: &mut Option<Answer>) -> Option<Outcome> {
+    fn take_up(
+        &mut self,
+        course: Course,
+        best: &mut Option<Answer>,
+        limits: &Limits,
+    ) -> Result<Option<Outcome>, Interrupted> {
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
         let least = course.least(self.concurrent);
         if best.as_ref().is_some_and(|best| is_lost(self.concurrent, &least, best)) {
-            return None;
+            return Ok(None);
         }
-        let HeuristicValue { left, preferred } = self.judge(&course, &least)?;
+        let Some(HeuristicValue { left, preferred }) = self.judge(&course, &least) else { return Ok(None) };
         let mut outcome = None;
         if course.is_goal(self.concurrent)
-            && let Some(candidate) = answer(self.concurrent, &course)
+            && let Some(candidate) = answer(self.concurrent, &course, limits)?
         {
             self.note_reached(&candidate.least);
             if best.as_ref().is_none_or(|best| candidate.value < best.value) {
@@ -172,7 +188,7 @@ impl<'a> Search<'a> {
         }
         self.bytes = self.bytes.saturating_add(course.bytes());
         self.nodes.push(course);
-        outcome
+        Ok(outcome)
     }
 
     fn note_reached(&mut self, least: &Rational) {
@@ -210,12 +226,11 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn pop(&mut self) -> Option<(Rational, u32, (OperatorId, u32))> {
+    fn pop(&mut self) -> Option<QueueEntry> {
         let filled = (0..self.queues.len()).filter(|queue| !self.queues[*queue].is_empty());
         let queue = filled.min_by_key(|queue| self.priorities[*queue])?;
         self.priorities[queue] = self.priorities[queue].saturating_add(1);
-        let Reverse((_, least, _, _, parent, operator)) = self.queues[queue].pop()?;
-        Some((least, parent, operator))
+        self.queues[queue].pop()
     }
 }
 
