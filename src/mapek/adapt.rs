@@ -215,13 +215,16 @@ impl Adaptation<'_> {
         let retry = self.beliefs.retry.take().filter(|scheduled| scheduled.at <= self.beliefs.now);
         let attempt = retry.map_or(0, |scheduled| scheduled.attempt);
         self.planner.attempt = attempt;
-        let outcome = self.plan(true);
+        let mut outcome = self.plan(true);
         if self.planner.is_missing {
             return;
         }
         self.schedule_retry(attempt, &outcome);
-        if is_necessary && self.interrupt(&reason, need, &outcome, answers) {
+        if is_necessary && self.interrupt(&reason, need, &mut outcome, answers) {
             return;
+        }
+        if outcome.steps.is_none() && self.beliefs.retry.is_none() {
+            self.schedule_retry(attempt, &outcome);
         }
         let Some(steps) = &outcome.steps else {
             self.report_no_plan(is_necessary, outcome, answers);
@@ -256,9 +259,10 @@ impl Adaptation<'_> {
 
     /// Decides whether to cancel or suspend the action under way. Compares `going_on`, a plan that begins with the
     /// remainder of the action, with a plan after its cancellation. Unless `need` is [`Need::Interrupted`], an action
-    /// that can continue is interrupted only if it is proved that no plan continues it. Returns `true` if the action
-    /// was interrupted, or if the decision needs a plan that the planner may not search for.
-    fn interrupt(&mut self, reason: &str, need: Need, going_on: &Outcome, answers: &mut Vec<Answer>) -> bool {
+    /// that can continue is interrupted only if it is proved that no plan continues it. If there is neither plan, the
+    /// absence of `going_on` remains proved only if that of the other plan is. Returns `true` if the action was
+    /// interrupted, or if the decision needs a plan that the planner may not search for.
+    fn interrupt(&mut self, reason: &str, need: Need, going_on: &mut Outcome, answers: &mut Vec<Answer>) -> bool {
         let Some(running) = self.beliefs.running.clone() else { return false };
         let can_go_on = goes_on_with(&running, going_on) || self.can_go_on(&running);
         if need != Need::Interrupted && can_go_on && (going_on.steps.is_some() || !going_on.proved) {
@@ -269,6 +273,7 @@ impl Adaptation<'_> {
             return true;
         }
         let gained = benefit(self.beliefs, self.settings, &going_on.cost, &without.cost);
+        going_on.proved &= going_on.steps.is_some() || without.steps.is_some() || without.proved;
         match weigh(reason, can_go_on, going_on, without, gained) {
             Interruption::None => false,
             Interruption::Cancel { because } => {

@@ -50,11 +50,12 @@ pub(super) fn weigh(
         },
         (None, None) if can_go_on => Interruption::None,
         (None, None) => {
-            let (status, no_plan) = if without.proved {
-                ("unsolvable", "no plan exists without the action")
+            let no_plan = if without.proved {
+                "no plan exists without the action"
             } else {
-                ("unknown", "no plan without the action was found")
+                "no plan without the action was found"
             };
+            let status = if going_on.proved && without.proved { "unsolvable" } else { "unknown" };
             let reason = format!("{reason}; {}, and {no_plan}", no_continuation(can_go_on, going_on.proved));
             Interruption::Suspend { reason, status, because: without.because, blocking: without.blocking }
         }
@@ -126,14 +127,15 @@ mod tests {
             let because = expected.to_owned();
             assert_eq!(decide(can_go_on, true), Interruption::Cancel { because });
         }
-        let reason =
-            "it is lost; no plan with another design was found, and no plan without the action was found";
-        let suspend = Interruption::Suspend {
-            reason: reason.to_owned(),
+        let suspend = |reason: &str| Interruption::Suspend {
+            reason: format!("it is lost; no plan with another design was found, and {reason}"),
             status: "unknown",
             because: "nothing serves".to_owned(),
             blocking: vec!["fd_a".to_owned()],
         };
-        assert_eq!(decide(false, false), suspend);
+        assert_eq!(decide(false, false), suspend("no plan without the action was found"));
+        // A plan that continues the action may exist.
+        let decision = weigh("it is lost", false, &outcome(false, false), outcome(false, true), None);
+        assert_eq!(decision, suspend("no plan exists without the action"));
     }
 }
