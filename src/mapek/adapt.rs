@@ -262,7 +262,13 @@ impl Adaptation<'_> {
     /// that can continue is interrupted only if it is proved that no plan continues it. If there is neither plan, the
     /// absence of `going_on` remains proved only if that of the other plan is. Returns `true` if the action was
     /// interrupted, or if the decision needs a plan that the planner may not search for.
-    fn interrupt(&mut self, reason: &str, need: Need, going_on: &mut Outcome, answers: &mut Vec<Answer>) -> bool {
+    fn interrupt(
+        &mut self,
+        reason: &str,
+        need: Need,
+        going_on: &mut Outcome,
+        answers: &mut Vec<Answer>,
+    ) -> bool {
         let Some(running) = self.beliefs.running.clone() else { return false };
         let can_go_on = goes_on_with(&running, going_on) || self.can_go_on(&running);
         if need != Need::Interrupted && can_go_on && (going_on.steps.is_some() || !going_on.proved) {

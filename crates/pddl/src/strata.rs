@@ -76,7 +76,9 @@ fn components(count: usize, edges: &[(&Name, usize, usize, usize)]) -> Vec<usize
     for (start, component) in finished.into_iter().rev().zip(0..) {
         let mut members = Vec::new();
         search(&heads, start, &mut visited, &mut members);
-        members.into_iter().for_each(|member| components[member] = component);
+        for member in members {
+            components[member] = component;
+        }
     }
     components
 }
