@@ -32,7 +32,7 @@ pub fn verification_conditions(
         return Ok(None);
     }
     let monotone = model.more_never_hurts();
-    Ok(Some(Writer { model: &model, argument: &argument, cost, monotone }.document()))
+    Ok(Some(Writer { model, argument: &argument, cost, monotone }.document()))
 }
 
 struct Writer<'w> {

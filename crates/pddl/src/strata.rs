@@ -130,9 +130,13 @@ mod tests {
     /// Domain in which each predicate `p` has the axioms `(:derived (p) body)` of the list.
     fn domain(axioms: &[(String, String)]) -> Domain {
         let mut text = "(define (domain d) (:predicates".to_owned();
-        axioms.iter().for_each(|(head, _)| write!(text, " ({head})").expect("a text"));
+        for (head, _) in axioms {
+            write!(text, " ({head})").expect("a text");
+        }
         text.push(')');
-        axioms.iter().for_each(|(head, body)| write!(text, "(:derived ({head}) {body})").expect("a text"));
+        for (head, body) in axioms {
+            write!(text, "(:derived ({head}) {body})").expect("a text");
+        }
         text.push(')');
         parse_domain(&Source::new("domain", text)).0.expect("a domain")
     }

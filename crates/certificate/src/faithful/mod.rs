@@ -53,7 +53,6 @@ mod world;
 use std::collections::BTreeSet;
 
 use num_rational::BigRational;
-use num_traits::Zero;
 
 use crate::check::GroundTask;
 use crate::model::Model;

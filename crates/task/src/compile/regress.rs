@@ -218,7 +218,6 @@ struct Flattening<'a> {
 
 impl Flattening<'_> {
     /// Adds the changes of an effect inside of quantifiers over `bound` and of `conditions`.
-    #[expect(clippy::arithmetic_side_effects, reason = "the number of changes fits into memory")]
     fn add(&mut self, effect: &Effect, bound: &[TypedName], conditions: &[Condition]) {
         // Conditions have been renamed already. Their quantified variables are not captured, whatever their names.
         let mut unused = u64::MAX / 2;
