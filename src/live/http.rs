@@ -187,11 +187,13 @@ mod tests {
         };
         check("GET / HTTP/1.1\r\nHost: a:1\r\n\r\n", Some(Ok(("/", Some("a:1")))));
         check("GET /events?x=1 HTTP/1.1\r\n\r\n", Some(Ok(("/events", None))));
+        check("GET /ready?verbose HTTP/1.0\r\n\r\n", Some(Ok(("/ready", None))));
         check("GET / HTTP/1.1\r\nHost: a", None);
         check("", None);
         check("POST / HTTP/1.1\r\n\r\n", Some(Err(405)));
         check("GET / HTTP/1.1\r\nHost: a\r\nhost: b\r\n\r\n", Some(Err(400)));
         check("\u{0}\u{1}\r\n\r\n", Some(Err(400)));
+        check("GET /live\r\n\r\n", Some(Err(400)));
         let headers = "X: y\r\n".repeat(100);
         check(&format!("GET / HTTP/1.1\r\n{headers}\r\n"), Some(Err(431)));
     }

@@ -156,6 +156,21 @@ mod tests {
         assert_eq!(ids.membership("r:83.1"), Membership::Absent);
     }
 
+    #[test]
+    fn the_two_lowest_ranges_are_merged_and_stored_after_the_others() {
+        use Membership::{Absent, Present, Unclear};
+        let mut ids = Ids::default();
+        // 17 ranges, of which the two lowest ones are merged to 10..=12.
+        for number in (10..=42).step_by(2) {
+            ids.insert(&format!("r:{number}"));
+        }
+        let stored = serde_json::to_string(&ids).expect("plain data");
+        assert!(stored.ends_with(",[42,42]],[10,12]]]"), "{stored}");
+        for (number, expected) in [(9, Absent), (11, Unclear), (13, Absent), (14, Present), (42, Present)] {
+            assert_eq!(ids.membership(&format!("r:{number}")), expected, "{number}");
+        }
+    }
+
     /// Compares with the set of all inserted numbers.
     #[test]
     fn inserted_numbers_are_present_or_lie_in_the_merged_range() {

@@ -114,3 +114,31 @@ pub async fn status<S: Store>(store: &S) -> Result<Status, Fault> {
         .map(|partition| PartitionStatus { partition, worker: owners.get(&partition).cloned() });
     Ok(Status { partitions: partitions.collect(), workers })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::store::local::Local;
+
+    #[tokio::test]
+    async fn sessions_that_end_with_a_digit_share_no_message_ids() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = Local::open(folder.path(), 1, 8, Duration::from_secs(1))
+            .unwrap_or_else(|message| panic!("{message}"));
+        let mut last = 0;
+        // Without a separator, the ids of the last two events would be `r:111`, and the second one would not be stored.
+        for (session, count) in [("", 1), ("1", 11), ("11", 1)] {
+            let mut sender = Sender::new(store.clone(), "r", session);
+            for _ in 0..count {
+                last = sender.send("equal").await.expect("the event is short");
+            }
+        }
+        assert_eq!(last, 13);
+        for (sequence, id) in [(1, "r:1"), (12, "r:1.11"), (13, "r:11.1")] {
+            let stored = store.next("0.r", sequence).await.expect("it can be read").expect("it exists");
+            assert_eq!(stored.id.as_deref(), Some(id));
+        }
+    }
+}

@@ -43,8 +43,8 @@ pub struct Settings {
     /// that had to be searched for.
     pub patience: Duration,
     /// Maximum number of robots in memory. Others are loaded from their last decision when they have events, and removed
-    /// afterwards. Robots that are handling events may exceed this number. A robot is also removed after ten minutes
-    /// without events.
+    /// afterwards. Robots that are handling events may exceed this number. A robot is also removed ten minutes after its
+    /// last event or plan.
     pub warm: usize,
     /// Number of handled events after which the events of a robot are discarded.
     pub discard_every: usize,

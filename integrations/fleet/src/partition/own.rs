@@ -47,8 +47,11 @@ impl<S: Store> Partition<S> {
                 biased;
                 Some(done) = self.running.join_next() => match done {
                     Ok(runner) => self.end(runner),
-                    // The worker starts the partition again.
-                    Err(_) => return,
+                    // The worker starts the partition again, which reads its events again.
+                    Err(_) => {
+                        self.positions().remove(&self.number);
+                        return;
+                    }
                 },
                 _ = drain.changed() => {}
                 message = next(&mut events) => {
@@ -90,8 +93,11 @@ impl<S: Store> Partition<S> {
                 }
             },
         }
-        let mut positions = self.shared.counts.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        positions.insert(self.number, self.seen);
+        self.positions().insert(self.number, self.seen);
+    }
+
+    fn positions(&self) -> MutexGuard<'_, BTreeMap<u32, u64>> {
+        self.shared.counts.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn refuse(&mut self, reason: &'static str, notice: Option<(&str, String)>, event: Stored) {
@@ -173,8 +179,9 @@ impl Inbox {
     }
 
     /// Waits for the next event of the robot, which is read from the log if it is not in memory. Events up to the sequence
-    /// number `decided` may be left out.
-    pub(super) async fn next<S: Store>(&self, store: &S, subject: &str, decided: u64) -> Stored {
+    /// number `decided` may be left out. Returns `None` if the events that the partition has read are no longer in the
+    /// log. The robot then has to check whether a plan is missing, instead of waiting for a further event.
+    pub(super) async fn next<S: Store>(&self, store: &S, subject: &str, decided: u64) -> Option<Stored> {
         loop {
             let (event, taken, last) = {
                 let mut queue = self.queue();
@@ -182,7 +189,7 @@ impl Inbox {
                 queue.taken = event.as_ref().map_or(queue.taken, |event| event.sequence);
                 (event, queue.taken, queue.last)
             };
-            if let Some(event) = event {
+            if event.is_some() {
                 return event;
             }
             if taken == last {
@@ -191,13 +198,13 @@ impl Inbox {
             }
             let start = taken.max(decided) + 1;
             let event = persist(|| store.next(subject, start)).await;
-            // Another worker may have discarded the events.
+            // Another worker or an operator may have discarded the events.
             let event = event.filter(|event| event.sequence <= last);
             self.queue().taken = event.as_ref().map_or(last, |event| event.sequence);
-            match event {
-                Some(event) => return event,
-                None => self.finish(),
+            if event.is_none() {
+                self.finish();
             }
+            return event;
         }
     }
 
@@ -219,22 +226,43 @@ impl Drop for Inbox {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
+    use crate::store::local::Local;
+
+    fn event(sequence: u64) -> Stored {
+        Stored { sequence, subject: "0.r".to_owned(), id: None, time: 0, payload: Vec::new() }
+    }
 
     #[test]
     fn the_memory_of_waiting_events_is_bounded() {
         let inbox = Inbox::new(&Arc::default());
         for sequence in 1..=100_000 {
-            inbox.push(Stored {
-                sequence,
-                subject: "0.r".to_owned(),
-                id: None,
-                time: 0,
-                payload: Vec::new(),
-            });
+            inbox.push(event(sequence));
         }
         let queue = inbox.queue();
         assert_eq!((queue.events.len(), queue.waiting, queue.last), (MAX_QUEUE, 100_000, 100_000));
         assert!(queue.events.capacity() <= 2 * MAX_QUEUE);
+    }
+
+    #[tokio::test]
+    async fn a_robot_does_not_wait_for_events_that_are_no_longer_in_the_log() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = Local::open(folder.path(), 1, 8, Duration::from_secs(1))
+            .unwrap_or_else(|message| panic!("{message}"));
+        let waiting = Arc::<AtomicU64>::default();
+        let inbox = Inbox::new(&waiting);
+        for sequence in 1..=20 {
+            inbox.push(event(sequence));
+        }
+        for sequence in 1..=16 {
+            assert_eq!(inbox.next(&store, "0.r", 0).await, Some(event(sequence)));
+            inbox.finish();
+        }
+        assert_eq!(waiting.load(Ordering::Relaxed), 4);
+        assert_eq!(inbox.next(&store, "0.r", 0).await, None);
+        assert!(inbox.is_empty());
+        assert_eq!(waiting.load(Ordering::Relaxed), 0);
     }
 }

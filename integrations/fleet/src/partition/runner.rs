@@ -133,7 +133,7 @@ impl<S: Store> Runner<S> {
                 continue;
             }
             let discard_at = self.since.map(|since| since + self.shared.settings.discard_within);
-            let unload_at = self.loaded.as_ref().map(|_| self.used + MAX_IDLE);
+            let unload_at = self.unload_at();
             let decided = self.loaded.as_ref().map_or(0, |loaded| loaded.robot.event);
             let Self { inbox, plans, shared, subject, .. } = &mut *self;
             tokio::select! {
@@ -141,7 +141,9 @@ impl<S: Store> Runner<S> {
                 () = drained(&mut drain) => break,
                 Some(plans) = join(plans) => self.conclude(plans).await,
                 () = until(discard_at) => {}
-                event = inbox.next(&shared.store, subject, decided) => self.handle(event).await,
+                event = inbox.next(&shared.store, subject, decided) => if let Some(event) = event {
+                    self.handle(event).await;
+                },
                 () = until(unload_at) => self.loaded = None,
             }
             let is_unknown = self.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission().is_none());
@@ -172,6 +174,12 @@ impl<S: Store> Runner<S> {
 
     fn is_idle(&self) -> bool {
         self.inbox.is_empty() && self.pending.is_none() && self.plans.is_empty()
+    }
+
+    /// Returns the time at which the robot is removed from memory. A robot with a missing plan stays, because plans for a
+    /// loop that was removed cannot be used.
+    fn unload_at(&self) -> Option<Instant> {
+        self.loaded.as_ref().filter(|_| self.is_idle()).map(|_| self.used + MAX_IDLE)
     }
 
     /// Returns `true` if nothing has to be kept in memory.
@@ -398,7 +406,9 @@ impl<S: Store> Runner<S> {
         // The events of a suspended robot stay in the log, also those before a refused retirement.
         let is_stuck = self.is_suspended || matches!(outcome, Outcome::Undecided(Undecided::Faulted(_)));
         if let Some(last) = sequence.filter(|_| !is_stuck).or(last) {
-            self.handled = self.handled.max(last);
+            // Another worker may have decided later events, which are then left out, but have to be discarded.
+            let decided = self.loaded.as_ref().map_or(0, |loaded| loaded.robot.event);
+            self.handled = self.handled.max(last).max(decided);
             self.obsolete += 1;
             self.since.get_or_insert_with(Instant::now);
         }
@@ -496,6 +506,26 @@ mod tests {
         }
         assert!(!run.is_finished());
         run.abort();
+    }
+
+    #[tokio::test]
+    async fn a_robot_stays_in_memory_while_its_search_runs() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let mut runner = runner(log(folder.path()), missions(), Settings::default());
+        assert_eq!(runner.unload_at(), None);
+        runner.load().await;
+        assert_eq!(runner.unload_at(), Some(runner.used + MAX_IDLE));
+        runner.plans.spawn(std::future::pending());
+        assert_eq!(runner.unload_at(), None);
+    }
+
+    #[tokio::test]
+    async fn events_that_another_worker_has_decided_are_discarded() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let mut runner = runner(log(folder.path()), missions(), Settings::default());
+        runner.load().await.robot.event = 5;
+        runner.register(Some(1), Outcome::Known);
+        assert_eq!(runner.handled, 5);
     }
 
     #[tokio::test]

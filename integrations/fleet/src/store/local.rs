@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use futures::stream::{self, StreamExt as _};
@@ -47,6 +47,9 @@ pub struct Local(Arc<Inner>);
 #[derive(Debug)]
 struct Inner {
     database: Arc<Database>,
+    /// Reason why a transaction could not be written. The database is then not used any longer. Without this rule, pages in
+    /// memory could still be read, so that readers would wait without end for further messages.
+    failure: Arc<OnceLock<Fault>>,
     partitions: u32,
     lease: Duration,
     requests: mpsc::UnboundedSender<(Write, oneshot::Sender<Answer>)>,
@@ -89,11 +92,12 @@ impl Local {
         let (requests, mut waiting) = mpsc::unbounded_channel();
         let (writing, written) = watch::channel(0);
         let (notices, _) = broadcast::channel(1024);
-        let writer = Arc::clone(&database);
+        let failure = Arc::<OnceLock<Fault>>::default();
+        let (writer, write_failure) = (Arc::clone(&database), Arc::clone(&failure));
         let write_all = move || {
             let mut batch = Vec::new();
             while waiting.blocking_recv_many(&mut batch, BATCH) > 0 {
-                write(&writer, history.max(1), &mut batch);
+                write(&writer, &write_failure, history.max(1), &mut batch);
                 writing.send_modify(|count| *count += 1);
             }
         };
@@ -102,7 +106,16 @@ impl Local {
             .spawn(write_all)
             .map_err(|error| wrong(&error))?;
         let workers = Mutex::default();
-        Ok(Self(Arc::new(Inner { database, partitions, lease, requests, written, notices, workers })))
+        Ok(Self(Arc::new(Inner {
+            database,
+            failure,
+            partitions,
+            lease,
+            requests,
+            written,
+            notices,
+            workers,
+        })))
     }
 
     /// Subscribes to notices about refused events and suspended robots: subject (`PARTITION.ROBOT`)
@@ -118,6 +131,9 @@ impl Local {
     }
 
     fn read<T>(&self, read: impl FnOnce(&ReadTransaction) -> Result<T, redb::Error>) -> Result<T, Fault> {
+        if let Some(fault) = self.0.failure.get() {
+            return Err(fault.clone());
+        }
         self.0.database.begin_read().map_err(redb::Error::from).and_then(|view| read(&view)).map_err(failed)
     }
 }
@@ -142,7 +158,12 @@ fn prepare(database: &Database, partitions: u32) -> Result<Option<u32>, redb::Er
 }
 
 /// Executes writes in one transaction.
-fn write(database: &Database, history: usize, batch: &mut Vec<(Write, oneshot::Sender<Answer>)>) {
+fn write(
+    database: &Database,
+    failure: &OnceLock<Fault>,
+    history: usize,
+    batch: &mut Vec<(Write, oneshot::Sender<Answer>)>,
+) {
     let transact = || {
         let transaction = database.begin_write()?;
         let mut tables = Tables::open(&transaction)?;
@@ -152,7 +173,11 @@ fn write(database: &Database, history: usize, batch: &mut Vec<(Write, oneshot::S
         transaction.commit()?;
         Ok::<_, redb::Error>(answers)
     };
-    let answers = transact().map_err(failed);
+    let answers = failure.get().map_or_else(|| transact().map_err(failed), |fault| Err(fault.clone()));
+    if let Err(fault) = &answers {
+        // The first reason is kept.
+        let _ = failure.set(fault.clone());
+    }
     for (position, (_, done)) in batch.drain(..).enumerate() {
         let answer = answers.as_ref().map_err(Clone::clone).and_then(|answers| answers[position].clone());
         // The requesting task may have been cancelled.
@@ -324,5 +349,22 @@ impl Store for Local {
     async fn notice(&self, subject: &str, text: &str) {
         // There may be no subscriber.
         let _ = self.0.notices.send((subject.to_owned(), text.to_owned()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_log_is_not_used_after_a_failed_transaction() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = Local::open(folder.path(), 1, 8, Duration::from_secs(1))
+            .unwrap_or_else(|message| panic!("{message}"));
+        let fault = Fault::Unreachable("no space left on device".to_owned());
+        store.0.failure.set(fault.clone()).expect("there is no other failure");
+        let message = Message { subject: "0.r", id: "", after: None, payload: b"x" };
+        assert_eq!(store.append(Stream::Events, message).await, Err(fault.clone()));
+        assert_eq!(store.end(Stream::Events, 0).await, Err(fault));
     }
 }
