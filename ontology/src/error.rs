@@ -1,4 +1,4 @@
-//! Problems of a knowledge base: an [`Error`] prevents its use, a [`Warning`] does not.
+//! Problems of a knowledge base and of requests to it: an [`Error`] ends the operation, a [`Warning`] does not.
 //!
 //! Codes are stable: `O1xx` for errors, `O2xx` for warnings of the reader, `O3xx` for warnings of lowering,
 //! `O4xx` for warnings about the TOMASys model.
@@ -41,7 +41,7 @@ impl fmt::Display for Position {
 /// Errors of a knowledge base.
 pub type Errors = diagnostics::Errors<Error>;
 
-/// The reason why a knowledge base cannot be used.
+/// The reason why a knowledge base cannot be read, or a request to it is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -1,4 +1,4 @@
-//! Example: the heating of a room follows temperature measurements, and each conclusion is explained.
+//! Example: the heating of a room follows temperature measurements. Prints after each measurement whether it is on.
 //!
 //! `cargo run -p metaplan-rules --example thermostat`
 #![expect(clippy::print_stdout, reason = "an example prints")]

@@ -1,5 +1,5 @@
 //! Queries of `metaplan reason`: entailment of statements, derivations of facts, reasons for
-//! missing facts, and inferred classes and properties.
+//! missing facts, and the inferred hierarchies of classes and properties.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

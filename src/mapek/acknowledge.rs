@@ -2,7 +2,7 @@
 //!
 //! The event `acknowledged` refers to an effect by its number. After the acknowledgement of a reconfiguration, its
 //! function is believed to have the requested design. Later observations, failures and acknowledgements can correct
-//! this belief. If another design was observed while the reconfiguration was pending, the design is unknown. Messages
+//! this belief. If an observation since the request contradicts the reconfiguration, the design is unknown. Messages
 //! can cross, be duplicated or arrive out of order: of two acknowledged reconfigurations of one function, the one
 //! requested later counts. A reconfiguration that a later one has superseded can still be acknowledged; until then its
 //! design is not believed.
@@ -128,8 +128,8 @@ impl Beliefs {
         Failure::Design(design)
     }
 
-    /// Records that a reconfiguration has arrived, unless it or a later one of the function is already recorded. If the
-    /// function was observed with another design while the reconfiguration was pending, the design is unknown.
+    /// Records that a reconfiguration has arrived, unless it or a later one of the function is already recorded. The
+    /// design is unknown if an observation since the request contradicts it.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let history = self.receipts.functions.entry(function.clone()).or_default();
         // A superseded reconfiguration with a smaller number may have been carried out without an answer. Then the

@@ -40,8 +40,8 @@ const LEAST_LEFT: u32 = 1000;
 const GATE: &str = "metaplan_resumed";
 
 /// Predicate that holds once the remainder of the action under way has started, so that the remainder occurs exactly
-/// once. The gate itself cannot ensure this: without a duration, start and end are one happening, in which the gate
-/// would be both required to be false and added.
+/// once. The gate itself cannot ensure this: it is added at the end. If the duration is 0, start and end are one
+/// happening, whose condition that the gate is false interferes with the effect that adds it.
 const STARTED: &str = "metaplan_remainder_started";
 
 /// Prefix of the names of companion functions.

@@ -171,7 +171,7 @@ pub(super) fn check_potential(
 ) -> Result<(), TableFault> {
     for values in table.matching(&model.goal.facts) {
         if !at_most(table.value(&values), Some(&Integer::ZERO), &Integer::ZERO) {
-            return Err(TableFault::NoBound(format!("the goal may hold at {values:?}")));
+            return Err(TableFault::NoBound(format!("the goal may hold at {values:?}, where it exceeds 0")));
         }
     }
     let least = |operator: &Operator| model.least(&operator.cost);
@@ -227,7 +227,9 @@ pub(super) fn check_need(
         .max(Integer::ZERO);
     for values in table.matching(&model.goal.facts) {
         if !at_most(table.value(&values), Some(&required), &Integer::ZERO) {
-            return Err(TableFault::NoBound(format!("the goal may hold at {values:?}")));
+            return Err(TableFault::NoBound(format!(
+                "the goal may hold at {values:?}, where it exceeds {required}"
+            )));
         }
     }
     let use_of = |operator: &Operator| use_of(model, operator, number);

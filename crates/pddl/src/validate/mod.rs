@@ -55,7 +55,8 @@ use step::Step;
 use targets::changeable_values;
 use world::{State, World};
 
-/// Maximum number of tried readings of a plan. A reading chooses one schema for each step that fits several.
+/// Maximum number of readings of a plan; if there are more, none is tried. A reading chooses one schema for each step that
+/// fits several.
 const MAX_READINGS: usize = 4096;
 
 /// Executes a plan and returns the verdict. Domain and problem must have passed [`check`](crate::check());
