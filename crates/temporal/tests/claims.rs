@@ -101,12 +101,12 @@ fn optimal(metric: &str) -> (Status, Option<String>) {
 /// Each end deletes the condition over all of the other action, so the ends are simultaneous.
 #[test]
 fn chosen_durations_let_actions_end_together() {
-    let action = |name: &str, own: &str, other: &str| {
+    let action = |name: &str, held: &str, changed: &str| {
         durative(
             name,
             FROM_1_TO_5,
-            &format!("(at start (r{name})) (over all ({own}))"),
-            &format!("(at start (not (r{name}))) (at end (not ({other}))) (at end (d{name}))"),
+            &format!("(at start (r{name})) (over all ({held}))"),
+            &format!("(at start (not (r{name}))) (at end (not ({changed}))) (at end (d{name}))"),
         )
     };
     let pair = [action("a", "p", "q"), action("x", "q", "p")];
@@ -118,31 +118,31 @@ fn chosen_durations_let_actions_end_together() {
     // A detour makes the goal reachable at a higher cost.
     let detour = "(:action detour :parameters () :precondition (da)
        :effect (and (dx) (increase (total-cost) 9)))";
-    let more = domain(predicates, "", &[&pair[..], &[detour.into()]].concat());
+    let with_detour = domain(predicates, "", &[&pair[..], &[detour.into()]].concat());
     let costs = problem(init, "(da) (dx)", "(+ (total-time) (total-cost))");
-    assert_eq!(solved(&more, &costs, witness), optimal("1"));
+    assert_eq!(solved(&with_detour, &costs, witness), optimal("1"));
     // The minimum durations differ, so the search must choose equal ones.
     let longer = [pair[0].clone(), pair[1].replace("?duration 1", "?duration 3")];
     let witness = "0: (a) [3]\n0: (x) [3]\n";
     assert_eq!(solved(&domain(predicates, "", &longer), &both, witness), optimal("3"));
-    let never = [
+    let staggered = [
         pair[0].clone(),
         pair[1].replace("?duration 5", "?duration 9").replace("?duration 1", "?duration 6"),
     ];
     // `a` can start later than `x`, so different durations suffice.
     let witness = "5: (a) [1]\n0: (x) [6]\n";
-    assert_eq!(solved(&domain(predicates, "", &never), &both, witness), optimal("6"));
+    assert_eq!(solved(&domain(predicates, "", &staggered), &both, witness), optimal("6"));
 }
 
 /// Each start adds the condition over all of the other action.
 #[test]
 fn chosen_durations_let_actions_start_together() {
-    let action = |name: &str, own: &str, other: &str| {
+    let action = |name: &str, held: &str, changed: &str| {
         durative(
             name,
             FROM_1_TO_5,
-            &format!("(over all ({own}))"),
-            &format!("(at start ({other})) (at end (not ({other}))) (at end (d{name}))"),
+            &format!("(over all ({held}))"),
+            &format!("(at start ({changed})) (at end (not ({changed}))) (at end (d{name}))"),
         )
     };
     let pair = [action("a", "p", "q"), action("x", "q", "p")];
@@ -292,14 +292,14 @@ fn the_shortest_duration_need_not_be_best() {
     assert_ne!(status, Status::Optimal);
 }
 
-/// Runs of one action that overlap have different durations.
+/// Overlapping runs of one action have different durations. Both last until the limit rises, so both have to reach it.
 #[test]
 fn overlapping_runs_compare_their_own_durations() {
     let action = durative(
         "a",
         FROM_1_TO_5,
-        "(over all (>= ?duration (limit))) (at end (changed))",
-        "(at end (increase (x) ?duration)) (at end (increase (count) 1))",
+        "(at start (>= (tickets) 1)) (over all (>= ?duration (limit))) (at end (changed))",
+        "(at start (decrease (tickets) 1)) (at end (increase (x) ?duration)) (at end (increase (count) 1))",
     );
     let change = durative(
         "change",
@@ -307,9 +307,9 @@ fn overlapping_runs_compare_their_own_durations() {
         "(at start (ready))",
         "(at start (not (ready))) (at end (increase (limit) 3)) (at end (changed))",
     );
-    let task = domain("(ready) (changed)", "(limit) (x) (count)", &[action, change]);
-    let init = "(ready) (= (limit) 0) (= (x) 0) (= (count) 0)";
+    let task = domain("(ready) (changed)", "(limit) (x) (count) (tickets)", &[action, change]);
+    let init = "(ready) (= (limit) 0) (= (x) 0) (= (count) 0) (= (tickets) 2)";
     let goal = problem(init, "(changed) (>= (count) 2)", "(+ (total-time) (x))");
-    let (_, cost) = solved(&task, &goal, "0: (a) [3]\n0: (a) [3]\n0: (change) [1]\n");
-    assert!(cost.is_some());
+    let (_, cost) = solved(&task, &goal, "0: (a) [3]\n0.001: (a) [3]\n0: (change) [1]\n");
+    assert_eq!(cost.as_deref(), Some("9.001"));
 }

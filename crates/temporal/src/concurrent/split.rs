@@ -202,8 +202,8 @@ fn parts(
     happenings
 }
 
-/// Returns `true` if the start and the end unconditionally assign the same number. At duration 0, they then interfere, so the
-/// action cannot be executed.
+/// Returns `true` if the start and the end unconditionally assign the same number. At duration 0,
+/// they then interfere, so the action cannot be executed.
 fn assigns_twice(schema: &Schema) -> bool {
     let is_certain = |effect: &Effect| {
         effect.bound.is_empty() && matches!(&effect.condition, Formula::And(parts) if parts.is_empty())
@@ -215,7 +215,7 @@ fn assigns_twice(schema: &Schema) -> bool {
         _ => None,
     };
     let mut at_start = schema.start_effects.iter().filter_map(assigned);
-    at_start.any(|number| schema.end_effects.iter().filter_map(assigned).any(|other| other == number))
+    at_start.any(|number| schema.end_effects.iter().filter_map(assigned).any(|candidate| candidate == number))
 }
 
 fn settled_of(lifted: &Lifted, conditions: &[Formula]) -> Vec<Formula> {
