@@ -312,8 +312,9 @@ fn the_schema_is_the_hierarchy_of_classes_and_properties() {
 
 #[test]
 fn assumed_intersections_of_unions_do_not_multiply_without_limit() {
-    let declared: String = (0..20).map(|i| format!(":L{i} a owl:Class . :R{i} a owl:Class .\n")).collect();
-    let unions: String = (0..20).map(|i| format!("[ a owl:Class ; owl:unionOf ( :L{i} :R{i} ) ] ")).collect();
+    let list = |item: fn(u32) -> String| (0..20).map(item).collect::<Vec<_>>().concat();
+    let declared = list(|i| format!(":L{i} a owl:Class . :R{i} a owl:Class .\n"));
+    let unions = list(|i| format!("[ a owl:Class ; owl:unionOf ( :L{i} :R{i} ) ] "));
     let conclusion = |last: &str| {
         format!("{declared}[ a owl:Class ; owl:intersectionOf ( {unions} {last} ) ] rdfs:subClassOf :B .")
     };

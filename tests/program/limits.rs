@@ -217,9 +217,10 @@ pub fn doors(places: u32) -> (String, String) {
           :effect (and (not (at ?a)) (at ?b) (increase (total-cost) 2)))
         (:action unlock :parameters (?p) :precondition (not (open ?p))
           :effect (and (open ?p) (increase (total-cost) 1))))";
-    let objects: String = (0..places).map(|number| format!(" p{number}")).collect();
+    let objects: Vec<_> = (0..places).map(|number| format!("p{number}")).collect();
+    let objects = objects.join(" ");
     let problem = format!(
-        "(define (problem p) (:domain doors) (:objects{objects}) (:init (at p0) (= (total-cost) 0)) (:goal (at p1))
+        "(define (problem p) (:domain doors) (:objects {objects}) (:init (at p0) (= (total-cost) 0)) (:goal (at p1))
            (:metric minimize (total-cost)))"
     );
     (domain.to_owned(), problem)

@@ -122,7 +122,8 @@ fn chain(length: usize) -> (Domain, Problem) {
       (:derived (reached ?x) (or (start ?x) (hot ?x) (exists (?y) (and (link ?y ?x) (reached ?y)))))
       (:action heat :parameters (?x) :effect (hot ?x)))";
     let objects = names("o", length);
-    let links: String = objects.windows(2).map(|pair| format!("(link {} {})", pair[0], pair[1])).collect();
+    let links: Vec<_> = objects.windows(2).map(|pair| format!("(link {} {})", pair[0], pair[1])).collect();
+    let links = links.concat();
     let last = &objects[length - 1];
     let objects = objects.join(" ");
     let problem = format!(

@@ -119,35 +119,83 @@ impl Timer {
         self.numerator.is_some().then(compare)
     }
 
-    /// Copy of a schema whose end effects read the duration from the fluent instead of computing it
-    /// from the state.
+    /// Copy of a schema whose end and over-all condition read the duration from the fluent, because
+    /// the duration expression may have another value in later states.
+    ///
+    /// Normalisation has replaced `?duration` by a copy of the duration expression. The functions in
+    /// this copy have the places of the `:duration` field, so the same expression written in a
+    /// condition or an effect differs from it and still reads the current state.
     pub(super) fn with_end(&self, schema: &Schema) -> Schema {
         let Some(duration) = &schema.duration else { return schema.clone() };
-        let replace = |expression: &Expression| replaced(expression, duration, &self.expression(schema));
+        let fluent = self.expression(schema);
+        let replace = |expression: &Expression| (expression == duration).then(|| fluent.clone());
         let mut copy = schema.clone();
-        for effect in &mut copy.end_effects {
-            if let Change::Assign { expression, .. } = &mut effect.change {
-                *expression = replace(expression);
-            }
-        }
+        copy.over_all = replace_in_formula(&copy.over_all, &replace);
+        copy.at_end = replace_in_formula(&copy.at_end, &replace);
+        replace_in_effects(&mut copy.end_effects, &replace);
         copy
     }
 }
 
-fn replaced(expression: &Expression, part: &Expression, other: &Expression) -> Expression {
-    let each = |parts: &[Expression]| parts.iter().map(|inner| replaced(inner, part, other)).collect();
-    if expression == part {
-        return other.clone();
+/// Copy of a schema with a chosen duration, in which the duration is 0.
+pub(super) fn with_zero_duration(schema: &Schema, chosen: FunctionId) -> Schema {
+    let zero = Expression::Number(Rational::from_integer(0));
+    let replace = |expression: &Expression| {
+        let is_chosen = matches!(expression, Expression::Function(function, ..) if *function == chosen);
+        is_chosen.then(|| zero.clone())
+    };
+    let mut copy = schema.clone();
+    copy.start_condition = replace_in_formula(&copy.start_condition, &replace);
+    copy.at_end = replace_in_formula(&copy.at_end, &replace);
+    replace_in_effects(&mut copy.start_effects, &replace);
+    replace_in_effects(&mut copy.end_effects, &replace);
+    copy
+}
+
+/// Returns the substitute of an expression, or `None` to keep the expression.
+type Replace<'r> = dyn Fn(&Expression) -> Option<Expression> + 'r;
+
+fn replace_in_effects(effects: &mut [Effect], replace: &Replace<'_>) {
+    for effect in effects {
+        effect.condition = replace_in_formula(&effect.condition, replace);
+        if let Change::Assign { expression, .. } = &mut effect.change {
+            *expression = replace_in_expression(expression, replace);
+        }
     }
+}
+
+fn replace_in_formula(formula: &Formula, replace: &Replace<'_>) -> Formula {
+    let each = |parts: &[Formula]| parts.iter().map(|part| replace_in_formula(part, replace)).collect();
+    match formula {
+        Formula::And(parts) => Formula::And(each(parts)),
+        Formula::Or(parts) => Formula::Or(each(parts)),
+        Formula::Exists(bound, body) => {
+            Formula::Exists(bound.clone(), Box::new(replace_in_formula(body, replace)))
+        }
+        Formula::ForAll(bound, body) => {
+            Formula::ForAll(bound.clone(), Box::new(replace_in_formula(body, replace)))
+        }
+        Formula::Compare(comparison, left, right, place) => {
+            let [left, right] = [left, right].map(|side| replace_in_expression(side, replace));
+            Formula::Compare(*comparison, left, right, *place)
+        }
+        Formula::Literal { .. } | Formula::Equal { .. } => formula.clone(),
+    }
+}
+
+fn replace_in_expression(expression: &Expression, replace: &Replace<'_>) -> Expression {
+    if let Some(substitute) = replace(expression) {
+        return substitute;
+    }
+    let inner = |part: &Expression| replace_in_expression(part, replace);
+    let each = |parts: &[Expression]| parts.iter().map(inner).collect();
     match expression {
         Expression::Sum(parts) => Expression::Sum(each(parts)),
         Expression::Product(parts, place) => Expression::Product(each(parts), *place),
-        Expression::Negate(inner) => Expression::Negate(Box::new(replaced(inner, part, other))),
-        Expression::Quotient(left, right, place) => Expression::Quotient(
-            Box::new(replaced(left, part, other)),
-            Box::new(replaced(right, part, other)),
-            *place,
-        ),
+        Expression::Negate(operand) => Expression::Negate(Box::new(inner(operand))),
+        Expression::Quotient(left, right, place) => {
+            Expression::Quotient(Box::new(inner(left)), Box::new(inner(right)), *place)
+        }
         Expression::Number(_) | Expression::Function(..) | Expression::TotalTime => expression.clone(),
     }
 }

@@ -57,12 +57,12 @@ use num_traits::Signed;
 use tracing::info_span;
 
 use ::search::bounds::Bounds;
-use pddl::ast::{self, ActionBody, Comparison, Direction, Domain, EffectTime, Problem, Span};
+use pddl::ast::{self, ActionBody, Comparison, Direction, Domain, Problem, Span};
 use task::compile::{CompiledTask, PlanSemantics, compile as compile_away, is_hidden};
 use task::context::Context;
 use task::error::{Error, Errors, File, Place};
 use task::ground::{Generality, GroundConfig, ground_lifted};
-use task::lifted::{Expression, Lifted, Metric, Rational};
+use task::lifted::{Expression, Lifted, Metric, Rational, Schema};
 use task::limits::Limits;
 use task::normalize::{normalize, normalize_freely, undefined_fluents};
 use task::number::Int;
@@ -132,7 +132,7 @@ impl<T: TimeNumber> TemporalTask<T> {
                 .map(|constraint| Deadline::new(&self.task, constraint, self.unit))
                 .collect(),
             is_exact: self.is_exact && plain.is_exact,
-            is_bounded: plain.is_exact,
+            is_bounded: self.is_bounded && plain.is_exact,
             ..self
         }
     }
@@ -154,6 +154,7 @@ fn ground_plain(files: Files<'_>, has_deadlines: bool) -> Result<ConcurrentTask,
             if free.violations.is_empty() && !has_deadlines =>
         {
             free.is_exact = free.is_exact && flexible_durations::is_exact(&free);
+            free.repairs_over_all = flexible_durations::may_repair_over_all(&free);
             free.shortest = match shortest {
                 Ok(ConcurrentTask(Width::Narrow(shortest))) => Some(shortest),
                 _ => None,
@@ -191,7 +192,7 @@ fn ground_with(
 ) -> Result<ConcurrentTask, Errors> {
     let lifted = || normalize(domain, problem, &config.objectives);
     let ground = |lifted| -> Result<ConcurrentTask, Errors> {
-        let task = ground_normal(domain, lifted, config, separation)?;
+        let task = ground_normal((domain, problem), lifted, config, separation)?;
         match &task.0 {
             Width::Narrow(narrow) if narrow.chooses_durations() => flexible_durations::check(narrow)?,
             Width::Wide(wide) if wide.chooses_durations() => {
@@ -212,7 +213,7 @@ fn ground_with(
 }
 
 fn ground_normal(
-    domain: &Domain,
+    (domain, problem): (&Domain, &Problem),
     mut lifted: Lifted,
     config: &GroundConfig,
     separation: &Rational,
@@ -228,10 +229,12 @@ fn ground_normal(
     };
     lifted.metrics = vec![metric];
     let is_strict = strict_comparisons::compares_strictly(&lifted);
-    let mut split = split::split(lifted, &config.solves, &|action| mentions_duration(domain, action));
+    let has_all_durations = has_all_durations((domain, problem), &lifted);
+    let mut split = split::split(lifted, &config.solves);
     // With chosen durations, strict comparisons require a minimal difference.
     let is_chosen = split.chosen.contains(&true);
     split.is_exact = if is_chosen { !is_strict } else { is_fixed(domain) };
+    split.is_bounded = if is_chosen { !is_strict } else { has_all_durations };
     let no_atoms = vec![Vec::new(); split.designs.len()];
     let (lifted, designs) = (&split.lifted, &split.designs);
     let precision = (is_chosen && is_strict).then_some(PRECISION);
@@ -251,11 +254,15 @@ fn ground_normal(
 /// Returns `true` if the duration of every action is fixed, by an equality or by two equal bounds that are
 /// numbers.
 fn is_fixed(domain: &Domain) -> bool {
+    domain.actions.iter().all(has_fixed_duration)
+}
+
+fn has_fixed_duration(action: &ast::Action) -> bool {
     let number = |constraint: &ast::DurationConstraint| match &constraint.expression {
         ast::Expression::Number(number, _) => Some(number.clone()),
         _ => None,
     };
-    domain.actions.iter().all(|action| match &action.body {
+    match &action.body {
         ActionBody::Durative { duration, .. } => match &duration[..] {
             [only] => only.operator == Comparison::Equal,
             [first, second] => {
@@ -267,29 +274,42 @@ fn is_fixed(domain: &Domain) -> bool {
             _ => false,
         },
         ActionBody::Instantaneous { .. } => true,
+    }
+}
+
+/// Returns `true` if the minimal durations of a normalised task admit the lower bounds of every plan: each duration
+/// is fixed, or variable with a positive minimum. The happenings of a minimum of 0 do not relax those of longer
+/// durations, because start and end are then one happening.
+fn has_all_durations((domain, problem): (&Domain, &Problem), lifted: &Lifted) -> bool {
+    let has_positive_minimum = |schema: &Schema| {
+        let duration = schema.duration.as_ref();
+        schema.is_chosen && duration.is_some_and(|duration| is_positive((problem, lifted), duration))
+    };
+    lifted.schemas.iter().all(|schema| {
+        let action = domain.actions.get(schema.action as usize);
+        action.is_some_and(has_fixed_duration) || has_positive_minimum(schema)
     })
 }
 
-/// Returns `true` if the value of a numeric end effect of the action mentions `?duration`.
-fn mentions_duration(domain: &Domain, action: u32) -> bool {
-    let Some(action) = domain.actions.get(action as usize) else { return false };
-    let ActionBody::Durative { effects, .. } = &action.body else { return false };
-    effects.iter().any(|(time, effect)| *time == EffectTime::AtEnd && measures(effect))
-}
-
-fn measures(effect: &ast::Effect) -> bool {
-    fn mentioned(expression: &ast::Expression) -> bool {
-        match expression {
-            ast::Expression::Duration(_) => true,
-            ast::Expression::Operation(_, operands, _) => operands.iter().any(mentioned),
-            _ => false,
+/// Returns `true` if an expression is certainly positive in every state.
+fn is_positive(task: (&Problem, &Lifted), expression: &Expression) -> bool {
+    let all = |parts: &[Expression]| !parts.is_empty() && parts.iter().all(|part| is_positive(task, part));
+    let (problem, lifted) = task;
+    match expression {
+        Expression::Number(number) => number.is_positive(),
+        Expression::Function(function, ..) => {
+            let function = &lifted.functions[function.index()];
+            let mut values = problem.init.iter().filter_map(|element| match element {
+                ast::InitialElement::Value(atom, value, _) => {
+                    (atom.predicate.name == function.name).then_some(value)
+                }
+                _ => None,
+            });
+            !function.fluent && values.all(Signed::is_positive)
         }
-    }
-    match effect {
-        ast::Effect::And(parts) => parts.iter().any(measures),
-        ast::Effect::ForAll(_, inner) | ast::Effect::When(_, inner) => measures(inner),
-        ast::Effect::Assign(_, _, value, _) => mentioned(value),
-        ast::Effect::Add(_) | ast::Effect::Delete(_) => false,
+        Expression::Sum(parts) | Expression::Product(parts, _) => all(parts),
+        Expression::Quotient(left, right, _) => is_positive(task, left) && is_positive(task, right),
+        Expression::Negate(_) | Expression::TotalTime => false,
     }
 }
 
@@ -320,7 +340,12 @@ fn optimize_fixed<T: TimeNumber>(
     let task = &concurrent.task;
     let mut record = Record::new(concurrent, Instant::now(), report);
     if let Some(reason) = &task.unreachable {
-        return ended(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())), record);
+        // Without all plans, the relaxation proves nothing.
+        return if concurrent.is_bounded {
+            ended(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())), record)
+        } else {
+            ended(Status::Unknown, None, record)
+        };
     }
     let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
     let bounds = (costs || !task.initial.numbers.is_empty())

@@ -17,8 +17,8 @@ use task::lifted::{
 };
 use task::number::dense;
 
-use crate::concurrent::duration_fluents::{Timer, depends_on_state};
-use pddl::ast::{Comparison, Name, Span};
+use crate::concurrent::duration_fluents::{Timer, depends_on_state, with_zero_duration};
+use pddl::ast::{Assignment, Comparison, Name, Span};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Half {
@@ -63,12 +63,14 @@ pub(super) struct Split {
     /// `false` if the split task may lose optimal plans, because a duration was fixed although the planner could
     /// choose it, or because durations are chosen and a condition contains a strict comparison.
     pub(super) is_exact: bool,
+    /// `false` if lower bounds and unreachability in the split task need not hold for every plan,
+    /// because the split task omits durations or conditions that plans can have.
+    pub(super) is_bounded: bool,
 }
 
 /// Splits a task into happenings. `solves` names the predicates that relate designs to the
-/// functions that they solve. `mentions` returns `true` if the end effects of the action with a
-/// given index mention `?duration`.
-pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) -> bool) -> Split {
+/// functions that they solve.
+pub(super) fn split(mut lifted: Lifted, solves: &[Name]) -> Split {
     let mut schemas = std::mem::take(&mut lifted.schemas);
     let (mut durations, mut divisors, mut chosen) = (Vec::new(), Vec::new(), Vec::new());
     let events = std::mem::take(&mut lifted.events);
@@ -88,14 +90,18 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
         let timer = duration.map(|duration| Timer::new(&mut lifted, schema, &duration));
         chosen.push(timer.as_ref().is_some_and(Timer::is_chosen));
         divisors.push(timer.as_ref().and_then(|timer| timer.divisor.clone()));
+        // Happening of duration 0. It reads the state before, not the duration fluent.
+        let mut instant = schema.clone();
         if let Some(timer) = &timer {
             durations.push(timer.function);
-            if !timer.is_chosen() && mentions(schema.action) {
+            if timer.is_chosen() {
+                instant = with_zero_duration(schema, timer.function);
+            } else {
                 *schema = timer.with_end(schema);
             }
         }
         let slot_parameters = design_parameters(&lifted, schema, solves);
-        for (half, mut part) in parts(&mut lifted, schema, timer.as_ref()) {
+        for (half, mut part) in parts(&mut lifted, (schema, &instant), timer.as_ref()) {
             if !events.is_empty() && matches!(half, Half::End | Half::Whole) {
                 part.end_effects.push(effect(Change::Delete(waited, Vec::new())));
             }
@@ -111,7 +117,8 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
         origins.push(Origin { schema: usize::MAX, half: Half::Timed(index) });
         designs.push(Vec::new());
     }
-    Split { lifted, schemas, origins, designs, events, durations, chosen, divisors, is_exact: true }
+    let (is_exact, is_bounded) = (true, true);
+    Split { lifted, schemas, origins, designs, events, durations, chosen, divisors, is_exact, is_bounded }
 }
 
 fn effect(change: Change) -> Effect {
@@ -122,7 +129,12 @@ fn literal(predicate: PredicateId, terms: &[Term]) -> Formula {
     Formula::Literal { positive: true, predicate, terms: terms.to_vec() }
 }
 
-fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Half, Schema)> {
+/// Returns the happenings of an action. `instant` is the action with duration 0.
+fn parts(
+    lifted: &mut Lifted,
+    (schema, instant): (&Schema, &Schema),
+    timer: Option<&Timer>,
+) -> Vec<(Half, Schema)> {
     let instantaneous = |condition: Vec<Formula>, effects: Vec<Effect>| Schema {
         start_condition: Formula::And(condition),
         start_effects: Vec::new(),
@@ -144,10 +156,12 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     };
     let choice = timer.and_then(|timer| timer.relaxed_increase(schema));
     let mut happenings = Vec::new();
-    if choice.is_none() && constant.is_none_or(|number| number == zero) {
-        let condition =
-            vec![compare(Comparison::Equal), schema.start_condition.clone(), schema.at_end.clone()];
-        let effects = schema.start_effects.iter().chain(&schema.end_effects).cloned().collect();
+    let may_be_instant = choice.is_none() || !assigns_twice(instant);
+    if may_be_instant && constant.is_none_or(|number| number == zero) {
+        let mut condition = vec![instant.start_condition.clone(), instant.at_end.clone()];
+        // The bounds of a chosen duration are conditions at the start.
+        condition.extend(choice.is_none().then(|| compare(Comparison::Equal)));
+        let effects = instant.start_effects.iter().chain(&instant.end_effects).cloned().collect();
         happenings.push((Half::Whole, instantaneous(condition, effects)));
     }
     if constant == Some(zero) {
@@ -186,6 +200,22 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     effects.extend(timer.map(|timer| timer.clear(schema)));
     happenings.push((Half::End, instantaneous(condition, effects)));
     happenings
+}
+
+/// Returns `true` if the start and the end unconditionally assign the same number. At duration 0,
+/// they then interfere, so the action cannot be executed.
+fn assigns_twice(schema: &Schema) -> bool {
+    let is_certain = |effect: &Effect| {
+        effect.bound.is_empty() && matches!(&effect.condition, Formula::And(parts) if parts.is_empty())
+    };
+    let assigned = |effect: &Effect| match &effect.change {
+        Change::Assign { assignment: Assignment::Assign, function, terms, .. } if is_certain(effect) => {
+            Some((*function, terms.clone()))
+        }
+        _ => None,
+    };
+    let mut at_start = schema.start_effects.iter().filter_map(assigned);
+    at_start.any(|number| schema.end_effects.iter().filter_map(assigned).any(|candidate| candidate == number))
 }
 
 fn settled_of(lifted: &Lifted, conditions: &[Formula]) -> Vec<Formula> {

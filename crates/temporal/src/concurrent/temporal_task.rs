@@ -80,8 +80,12 @@ pub(super) struct TemporalTask<T: TimeNumber = Int> {
     /// `true` if the search covers every plan with all its possible times, so that exhausting the search is a
     /// proof.
     pub(super) is_exact: bool,
-    /// `true` if the heuristic lower bounds hold for every plan. Otherwise, 0 is the only lower bound.
+    /// `true` if the heuristic lower bounds hold for every plan, and no plan exists if the relaxed task is
+    /// unreachable. Otherwise, 0 is the only lower bound.
     pub(super) is_bounded: bool,
+    /// `true` if the search for chosen durations must continue after a happening that violates an over-all
+    /// condition of a running action, because simultaneous happenings may remove the violation.
+    pub(super) repairs_over_all: bool,
     /// `false` if the search minimises only a part of the metric.
     pub(super) is_whole: bool,
     /// Least distance between interfering happenings, in internal time units.
@@ -190,7 +194,8 @@ impl Parts<'_> {
             violations,
             deadlines: Vec::new(),
             is_exact,
-            is_bounded: true,
+            is_bounded: split.is_bounded,
+            repairs_over_all: false,
             is_whole,
             separation,
             unit: unit.of(&Rational::from_integer(1)).map_err(to_errors)?,

@@ -45,14 +45,14 @@ impl<S: Store> Partition<S> {
             }
             tokio::select! {
                 biased;
-                Some(done) = self.running.join_next() => match done {
-                    Ok(runner) => self.end(runner),
-                    // The worker starts the partition again, which reads its events again.
-                    Err(_) => {
+                Some(done) = self.running.join_next() => {
+                    let Ok(runner) = done else {
+                        // The worker starts the partition again, which reads its events again.
                         self.positions().remove(&self.number);
                         return;
-                    }
-                },
+                    };
+                    self.end(runner);
+                }
                 _ = drain.changed() => {}
                 message = next(&mut events) => {
                     if let Some(Ok(event)) = message {
@@ -83,15 +83,16 @@ impl<S: Store> Partition<S> {
                 let refused = Refused::WrongPartition;
                 self.refuse(refused.into(), Some((&event.subject.clone(), refused.to_string())), event);
             }
-            Some(address) => match self.inboxes.get(&address.robot) {
-                Some(inbox) => inbox.push(event),
-                None => {
+            Some(address) => {
+                if let Some(inbox) = self.inboxes.get(&address.robot) {
+                    inbox.push(event);
+                } else {
                     let inbox = Arc::new(Inbox::new(&self.shared.counts.waiting));
                     inbox.push(event);
                     self.inboxes.insert(address.robot.clone(), Arc::clone(&inbox));
                     self.start(Box::new(Runner::new(Arc::clone(&self.shared), address, inbox)));
                 }
-            },
+            }
         }
         self.positions().insert(self.number, self.seen);
     }

@@ -17,6 +17,7 @@ mod linear_program;
 mod mazurkiewicz_trace;
 mod partial_plan_lp;
 mod search;
+mod simultaneous;
 
 use task::error::{Error, Errors};
 use task::limits::Limits;
@@ -36,6 +37,8 @@ use crate::concurrent::temporal_task::TemporalTask;
 use answer::Answer;
 use partial_plan_lp::Course;
 use search::{Outcome, Search};
+
+pub(super) use simultaneous::may_repair_over_all;
 
 /// Checks that the chosen durations of a task are supported.
 ///
@@ -59,8 +62,7 @@ pub(super) fn check(concurrent: &TemporalTask) -> Result<(), Errors> {
 /// Returns `true` if the exhaustive search covers every plan with all its possible times and durations.
 ///
 /// Returns `false` in particular if
-/// - a chosen duration may be less than the separation, in particular 0 (the action is then a single
-///   happening),
+/// - a chosen duration may be less than the separation,
 /// - a duration depends on the state and is not chosen,
 /// - several happenings can jointly maintain a condition at one time, or
 /// - the task has timed initial literals, since a plan may end right before them.

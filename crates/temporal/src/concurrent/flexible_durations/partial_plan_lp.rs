@@ -78,6 +78,12 @@ pub(super) struct Course {
     ranges: Vec<(Column, Rational, Option<Rational>)>,
     /// Time of the last timed initial literals that have taken place, or -1.
     floor: Int,
+    /// Time of the last happening if it violates an over-all condition of a running action. The next happening must
+    /// then be simultaneous. `None` if all these conditions hold.
+    group: Option<Affine>,
+    /// `true` if some happenings of the sequence must be simultaneous, because the first of them violates an
+    /// over-all condition.
+    pub(super) has_simultaneous: bool,
     /// Sum of the costs of the happenings, in the task's cost unit.
     pub(super) cost: Rational,
     pub(super) program: Program,
@@ -97,6 +103,8 @@ impl Course {
             passed: Vec::new(),
             ranges: Vec::new(),
             floor: -1,
+            group: None,
+            has_simultaneous: false,
             cost: rational(0),
             program: Program::new(Affine::column(MAKESPAN)),
         }
@@ -128,6 +136,11 @@ impl Course {
     /// Instances of the running actions; an instance occurs once for each of its simultaneous runs.
     pub(super) fn instances(&self) -> impl Iterator<Item = u32> {
         self.opens.iter().map(|open| open.instance)
+    }
+
+    /// Returns `true` if the over-all conditions of all running actions hold, apart from comparisons.
+    pub(super) fn is_settled(&self) -> bool {
+        self.group.is_none()
     }
 
     fn runs(&self, instance: u32) -> usize {
@@ -280,6 +293,17 @@ impl Course {
         })
     }
 
+    /// Value of an expression in an over-all condition of a running action. All runs of an instance
+    /// share one duration variable; the expression reads the duration of this run.
+    fn value_during(&self, concurrent: &TemporalTask, open: &RunningAction, linear: &Linear<Int>) -> Affine {
+        let value = self.value(linear);
+        let timer = concurrent.instances[open.instance as usize].timer;
+        let Some(((timer, _), number)) = timer.zip(open.number.as_ref()) else { return value };
+        let factor = linear.coefficients.iter().find(|(variable, _)| *variable == timer);
+        let Some((_, factor)) = factor else { return value };
+        value.plus(&number.minus(&self.numbers[timer.index()]), &rational(*factor))
+    }
+
     /// Adds the constraint that the duration in `column` is at least `least`, and stores the bounds of the
     /// duration that single constraints imply. Returns `None` if the bounds contradict each other.
     fn note_range(&mut self, column: Column, least: Rational, constraints: &mut Vec<Affine>) -> Option<()> {
@@ -335,6 +359,10 @@ impl Course {
             }
             _ => Affine::column(time_of(position)),
         };
+        if let Some(group) = self.group.take() {
+            ask(time.minus(&group), constraints)?;
+            ask(group.minus(&time), constraints)?;
+        }
         if let Role::Start(instance) = role {
             duration = self.duration(concurrent, instance, position);
             let end = time.plus(&duration, &rational(1));
@@ -408,8 +436,9 @@ impl Course {
     }
 
     /// Adds constraints that the over-all conditions of all running actions hold after the last
-    /// happening, `operator`. Returns `None` if a propositional condition does not hold or a
-    /// constraint is certainly violated.
+    /// happening, `operator`. If a propositional condition does not hold, the next happening must be
+    /// simultaneous. Returns `None` if no simultaneous happening can help or a constraint is certainly
+    /// violated.
     fn keep_up(
         &mut self,
         concurrent: &TemporalTask,
@@ -428,13 +457,17 @@ impl Course {
             let Some(over_all) = concurrent.instances[instance as usize].over_all else { continue };
             let condition = &concurrent.task.operators[over_all.index()].condition;
             if !condition.holds_propositionally(&self.values) {
-                return None;
+                if !concurrent.repairs_over_all {
+                    return None;
+                }
+                self.group = Some(time.clone());
+                self.has_simultaneous = true;
             }
             for linear in condition.linears() {
                 let mentions =
                     |variable| linear.coefficients.iter().any(|(candidate, _)| *candidate == variable);
                 if role == Role::Start(instance) || writes.iter().any(|effect| mentions(effect.variable)) {
-                    ask(self.value(linear), constraints)?;
+                    ask(self.value_during(concurrent, &self.opens[index], linear), constraints)?;
                 }
             }
         }

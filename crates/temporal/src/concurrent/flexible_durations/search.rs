@@ -30,6 +30,9 @@ use crate::concurrent::temporal_task::TemporalTask;
 /// heuristic value.
 const BOOST: i64 = 1_000;
 
+/// Mark of sequences with happenings that must be simultaneous.
+const SIMULTANEOUS: (OperatorId, u32) = (OperatorId(u32::MAX), u32::MAX);
+
 /// Queue entry: of the parent node, the heuristic value, the lower bound on the metric, and the depth (deepest
 /// first); insertion order; the parent node; and the happening with the index of the action's run that it ends (0
 /// for a start).
@@ -204,7 +207,14 @@ impl<'a> Search<'a> {
             Kind::Exhaustive { traces, seen } => {
                 let sequence: Vec<_> =
                     course.passed.iter().map(|passed| (passed.operator, passed.run)).collect();
-                let is_new = seen.insert(traces.first(&sequence));
+                // Simultaneity depends on the order of the happenings, so such a sequence represents
+                // only itself. The mark distinguishes it from the first sequence of a trace.
+                let key = if course.has_simultaneous {
+                    [&sequence[..], &[SIMULTANEOUS]].concat()
+                } else {
+                    traces.first(&sequence)
+                };
+                let is_new = seen.insert(key);
                 is_new.then(|| HeuristicValue { left: 0, preferred: Vec::new() })
             }
             Kind::Greedy { guidance, seen } => {
@@ -245,6 +255,7 @@ fn signature(course: &Course) -> u64 {
     let mut hasher = FxHasher::default();
     course.values.hash(&mut hasher);
     course.instances().for_each(|instance| instance.hash(&mut hasher));
+    course.is_settled().hash(&mut hasher);
     for number in &course.numbers {
         course.highest(number).hash(&mut hasher);
         if number.known().is_none() {
