@@ -61,6 +61,7 @@ pub(super) enum Width {
 }
 
 #[derive(Debug, Clone)]
+#[expect(clippy::struct_excessive_bools, reason = "the properties are independent")]
 pub(super) struct TemporalTask<T: TimeNumber = Int> {
     pub(super) task: Task,
     pub(super) happenings: Vec<Happening<T>>,
