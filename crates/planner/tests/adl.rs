@@ -171,6 +171,24 @@ fn a_derived_predicate_that_the_start_changes_is_refused() {
     assert!(errors.iter().any(|error| error.to_string().contains("its own start effects")), "{errors:?}");
 }
 
+/// The duration is 5. If the condition read the value after the start, there would be no plan.
+#[test]
+fn a_duration_that_the_start_changes_is_refused() {
+    let domain = "(define (domain d) (:requirements :durative-actions :numeric-fluents)
+      (:predicates (ready) (done)) (:functions (need))
+      (:durative-action work :parameters () :duration (= ?duration (need))
+        :condition (and (at start (ready)) (at end (>= ?duration 3)))
+        :effect (and (at start (assign (need) 1)) (at end (done)))))";
+    let problem = "(define (problem p) (:domain d) (:init (ready) (= (need) 5)) (:goal (done)))";
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let errors = ground(&domain, &problem, &GroundConfig::default()).expect_err("a refusal");
+    assert!(
+        errors.iter().any(|error| error.to_string().contains("a function of the duration")),
+        "{errors:?}"
+    );
+}
+
 #[test]
 fn numbers_below_zero_do_no_harm_where_nothing_is_used() {
     let domain = "(define (domain d) (:predicates (done)) (:functions (level) (total-cost))

@@ -36,7 +36,7 @@ use crate::error::{Error, Errors};
 use crate::lifted::Lifted;
 use crate::lifted::configuration::{SlotParameter, design_parameters, slot_parameters};
 use crate::limits::Limits;
-use crate::normalize::{events, normalize, undefined_fluents, zero_duration};
+use crate::normalize::{duration, events, normalize, undefined_fluents, zero_duration};
 use crate::task::Task;
 use crate::task::number::TaskNumber;
 use pddl::ast::{Domain, Problem};
@@ -92,6 +92,10 @@ pub fn ground_for<N: TaskNumber>(
     let GroundConfig { objectives, limits, .. } = config;
     let plain = info_span!("compile")
         .in_scope(|| compile(domain, problem, objectives, PlanSemantics::Sequence, limits))?;
+    let errors = duration::changed_by_start(&plain.domain);
+    if !errors.is_empty() {
+        return Err(errors.into());
+    }
     let lifted =
         || info_span!("normalize").in_scope(|| normalize(&plain.domain, &plain.problem, &plain.objectives));
     let grounded = ground_normal(lifted()?, config, generality);

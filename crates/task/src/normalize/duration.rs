@@ -11,6 +11,7 @@ use crate::normalize::condition::expression;
 use crate::normalize::names::{Duration, Names, Scope};
 use crate::number::dense;
 use pddl::ast::{self, Comparison, Direction, Name, Span};
+use pddl::visit::Node;
 
 /// Prefix of the names of auxiliary numeric functions that hold chosen durations. Names in PDDL files contain
 /// no parentheses, so neither these names nor their ground names conflict with those of a domain.
@@ -155,6 +156,47 @@ pub(super) fn changing_at_end(domain: &ast::Domain, lifted: &Lifted) -> Vec<Erro
                     place: Place { file: File::Domain, span: constraint.span },
                 });
             }
+        }
+    }
+    errors
+}
+
+/// Returns an error for each action that reads `?duration` after its start has changed a function of the duration. The
+/// duration is a number that is fixed at the start, but `?duration` is replaced by its expression.
+pub fn changed_by_start(domain: &ast::Domain) -> Vec<Error> {
+    let mut errors = Vec::new();
+    for action in &domain.actions {
+        let ast::ActionBody::Durative { duration, conditions, effects } = &action.body else { continue };
+        let mut changed = Vec::new();
+        for (_, effect) in effects.iter().filter(|(time, _)| *time == ast::EffectTime::AtStart) {
+            effect.walk(&mut |node| {
+                if let Node::Effect(ast::Effect::Assign(_, target, ..)) = node {
+                    changed.push(&target.predicate.name);
+                }
+            });
+        }
+        let mut is_changed = false;
+        for constraint in duration {
+            constraint
+                .expression
+                .walk_fluents(&mut |atom| is_changed |= changed.contains(&&atom.predicate.name));
+        }
+        let mut read = None;
+        let mut visit = |node: Node<'_>| {
+            if let Node::Expression(ast::Expression::Duration(span)) = node {
+                read = Some(*span);
+            }
+        };
+        let later = conditions.iter().filter(|(time, _)| *time != ast::ConditionTime::AtStart);
+        later.for_each(|(_, condition)| condition.walk(&mut visit));
+        let later = effects.iter().filter(|(time, _)| *time == ast::EffectTime::AtEnd);
+        later.for_each(|(_, effect)| effect.walk(&mut visit));
+        if let Some(span) = read.filter(|_| is_changed) {
+            errors.push(Error::Unsupported {
+                construct: "`?duration` after the start has changed a function of the duration".into(),
+                instead: "a function that the start does not change, or plan with `--concurrent`".into(),
+                place: Place { file: File::Domain, span },
+            });
         }
     }
     errors
