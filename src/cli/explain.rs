@@ -316,7 +316,7 @@ fn changes_text(found: &SmallestChanges) -> String {
         text += &plan_text(&change.then);
     }
     if !complete {
-        text += "a plan is not proved best: other changes were not examined\n";
+        text += "a result is not proved: other changes were not examined\n";
     }
     text + &unexamined_text(unexamined)
 }

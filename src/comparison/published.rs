@@ -58,8 +58,8 @@ impl Published {
 }
 
 /// Returns at most `max_routes` simple routes from start to goal, in ascending length. The length of an arc is its
-/// least time over all configurations. Arcs that no configuration can traverse are in no route. The search stops after 2,000,000 partial routes with the routes found until
-/// then.
+/// least time over all configurations. Arcs that no configuration can traverse are in no route. The search stops after
+/// 2,000,000 partial routes with the routes found until then.
 pub fn shortest_routes(mission: &Coadaptation, max_routes: usize) -> Vec<Vec<usize>> {
     // The queue needs totally ordered lengths, so they are rounded to millionths of the time unit. Sums of lengths near
     // the maximum saturate.

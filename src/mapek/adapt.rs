@@ -220,11 +220,15 @@ impl Adaptation<'_> {
             return;
         }
         self.schedule_retry(attempt, &outcome);
-        if is_necessary && self.interrupt(&reason, need, &mut outcome, answers) {
+        let is_decided = is_necessary && self.interrupt(&reason, need, &mut outcome, answers);
+        if self.planner.is_missing {
             return;
         }
         if outcome.steps.is_none() && self.beliefs.retry.is_none() {
             self.schedule_retry(attempt, &outcome);
+        }
+        if is_decided {
+            return;
         }
         let Some(steps) = &outcome.steps else {
             self.report_no_plan(is_necessary, outcome, answers);
@@ -279,7 +283,11 @@ impl Adaptation<'_> {
             return true;
         }
         let gained = benefit(self.beliefs, self.settings, &going_on.cost, &without.cost);
-        going_on.proved &= going_on.steps.is_some() || without.steps.is_some() || without.proved;
+        if going_on.steps.is_none() && without.steps.is_none() && going_on.proved && !without.proved {
+            going_on.proved = false;
+            going_on.because.clone_from(&without.because);
+            going_on.blocking.clear();
+        }
         match weigh(reason, can_go_on, going_on, without, gained) {
             Interruption::None => false,
             Interruption::Cancel { because } => {

@@ -57,7 +57,9 @@ pub(super) fn weigh(
             };
             let status = if going_on.proved && without.proved { "unsolvable" } else { "unknown" };
             let reason = format!("{reason}; {}, and {no_plan}", no_continuation(can_go_on, going_on.proved));
-            Interruption::Suspend { reason, status, because: without.because, blocking: without.blocking }
+            // The reason is that of the plan whose absence is not proved, if there is one.
+            let missing = if without.proved && !going_on.proved { going_on.clone() } else { without };
+            Interruption::Suspend { reason, status, because: missing.because, blocking: missing.blocking }
         }
     }
 }
@@ -134,8 +136,10 @@ mod tests {
             blocking: vec!["fd_a".to_owned()],
         };
         assert_eq!(decide(false, false), suspend("no plan without the action was found"));
-        // A plan that continues the action may exist.
-        let decision = weigh("it is lost", false, &outcome(false, false), outcome(false, true), None);
+        // A plan that continues the action may exist, whatever the reasons against a plan without the action.
+        let proof =
+            Outcome { because: "all is lost".to_owned(), blocking: Vec::new(), ..outcome(false, true) };
+        let decision = weigh("it is lost", false, &outcome(false, false), proof, None);
         assert_eq!(decision, suspend("no plan exists without the action"));
     }
 }

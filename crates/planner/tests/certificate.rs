@@ -303,6 +303,8 @@ fn the_measure_of_plans_does_not_depend_on_the_witness() {
     assert_eq!(solution.plan.as_ref().map(|plan| plan.cost.to_string()), Some("0".into()));
     let certificate = certify(&task, &solution, &Limits::none()).expect("a certificate");
     let honest = witness(&files.0, &files.1, &certificate.task, &|| false).expect("a witness");
+    let answer = faithful(&files.0, &files.1, &certificate.task, &honest, &|| false);
+    assert!(matches!(answer, Faithful::Yes { timed: true, .. }), "{answer:?}");
     let mut larger: Value = serde_json::from_str(&honest).expect("JSON");
     let atoms = larger["atoms"].as_array_mut().expect("a list");
     atoms.extend(["(q)", "(r)", "(s)"].map(Value::from));

@@ -465,7 +465,10 @@ fn takes_time(domain: &Domain, problem: &Problem, action: &Action) -> bool {
                     }
                     _ => true,
                 };
-                !domain.actions.iter().any(changes) && problem.init.iter().all(is_positive)
+                let is_value = |element: &InitialElement| matches!(element, InitialElement::Value(atom, ..) if atom.predicate.name == *name);
+                // Without a value, `total-cost` is 0.
+                let has_value = *name != Name::new("total-cost") || problem.init.iter().any(is_value);
+                has_value && !domain.actions.iter().any(changes) && problem.init.iter().all(is_positive)
             }
             _ => false,
         }

@@ -37,6 +37,8 @@ pub(super) fn answer(
     if !program.constrain(&goal, limits)? {
         return Ok(None);
     }
+    // There is a plan, which is not lost if a limit is reached meanwhile.
+    let limits = &limits.extended();
     let value = course.value_of_plan(concurrent);
     let durations: Vec<Affine> =
         course.chosen(concurrent).map(|position| Affine::column(duration_of(position))).collect();

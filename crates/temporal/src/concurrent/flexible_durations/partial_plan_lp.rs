@@ -123,7 +123,8 @@ impl Course {
             expressions.into_iter().flatten().map(Affine::bytes).fold(0, usize::saturating_add)
         });
         let fixed_size = size_of_val(&self.values[..]).saturating_add(size_of_val(&self.ranges[..]));
-        let fixed_size = fixed_size.saturating_add(self.program.bytes());
+        let group = self.group.as_ref().map_or(0, Affine::bytes);
+        let fixed_size = fixed_size.saturating_add(group).saturating_add(self.program.bytes());
         numbers.chain(times).chain(runs).fold(fixed_size, usize::saturating_add)
     }
 
