@@ -5,7 +5,7 @@ use num_rational::BigRational;
 use num_traits::{Signed, Zero};
 use pddl::ast::{
     Action, ActionBody, Comparison, Condition, Constraint, Domain, DurationConstraint, Effect, EffectTime,
-    Expression, InitialElement, Problem, Span, Trajectory,
+    Expression, InitialElement, Name, Problem, Span, Trajectory,
 };
 use pddl::visit::Node;
 use rustc_hash::FxHashSet;
