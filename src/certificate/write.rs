@@ -191,7 +191,8 @@ fn compared(
     Ok((task, witness))
 }
 
-/// Writes the formula "there is a better plan" and its refutation to files in `directory`. Returns `Refutation::None` with the reasons if no refutation is found or its proof is too large.
+/// Writes the formula "there is a better plan" and its refutation to files in `directory`. Returns `Refutation::None` with
+/// the reasons if no refutation is found or its proof is too large.
 fn refutation(directory: &Path, claimed: &Claimed<'_>, limits: &Limits) -> std::io::Result<Refutation> {
     let create = |name: &str| fs::File::create(directory.join(name)).map(BufWriter::new);
     let written_draft = || {

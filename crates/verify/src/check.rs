@@ -50,8 +50,8 @@ impl<'a> Verifier<'a> {
         Self { mission: mission.into(), ..self }
     }
 
-    /// Sets a time limit, counted from this call, for the checks of the ground task, the plan, the argument and
-    /// the formula. The other checks do not observe it. A check that reaches the limit fails.
+    /// Sets a time limit, counted from this call, for the checks of the ground task, the plan and the argument, and for
+    /// the encoding of the formula. The other checks do not observe it. A check that reaches the limit fails.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         Self { until: Instant::now().checked_add(time), ..self }

@@ -33,7 +33,7 @@ pub(super) fn encode(
     formula.has_number(sums.widest());
     for step in 0..steps {
         if stop() {
-            return Err("it was stopped before its end".into());
+            return Err("the encoding was stopped before its end".into());
         }
         let before = formula.literals();
         timeline.advance(model, &mut formula, step);

@@ -59,11 +59,16 @@ pub(super) fn bounds(
     if stop() {
         return Err(stopped());
     }
-    let potential = fewest.ok_or_else(|| format!("a cheaper plan may have more than {STEP_LIMIT} steps"))?;
+    let potential = fewest
+        .into_iter()
+        .chain(spent)
+        .min()
+        .ok_or_else(|| format!("a cheaper plan may have more than {STEP_LIMIT} steps"))?;
     Ok(StepBounds { spent, potential })
 }
 
-/// Checks that no plan of more than `steps` steps costs less than `cost`, as for [`StepBounds::potential`]. Returns the position of a potential that proves it. The potential is checked, too.
+/// Checks that no plan of more than `steps` steps costs less than `cost`, as for [`StepBounds::potential`]. Returns the
+/// position of a potential that proves it. The potential is checked, too.
 pub(super) fn check(
     model: &Model,
     argument: &Argument,
@@ -77,11 +82,19 @@ pub(super) fn check(
     let serves = |(position, potential): (usize, &crate::argument::Potential)| {
         let table = Table::new(model, &potential.pattern, &potential.values);
         let mut layers = Layers::new(model, &table, stop)?;
-        (0..=steps).for_each(|_| layers.advance());
+        for _ in 0..=steps {
+            if stop() {
+                return None;
+            }
+            layers.advance();
+        }
         let is_enough = layers.least().is_none_or(|least| least >= *cost);
         (is_enough && check_potential(model, &table, stop).is_ok()).then_some(position)
     };
     let position = argument.potentials.iter().enumerate().find_map(serves);
+    if position.is_none() && stop() {
+        return Err("the check of the number of steps was stopped".to_owned());
+    }
     position.ok_or_else(|| format!("a cheaper plan may have more than {steps} steps"))
 }
 

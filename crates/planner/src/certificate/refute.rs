@@ -10,7 +10,7 @@ use task::limits::Limits;
 use crate::certificate::trim;
 
 /// Maximum number of conflicts for the formula whose number of steps does not depend on a potential. Writing a certificate
-/// should take at most about five times as long as planning, and the claim rests on the argument without a formula.
+/// should take about five times as long as planning on average, and the claim rests on the argument without a formula.
 const SPENT_CONFLICT_LIMIT: u64 = 500;
 /// Maximum number of conflicts for the formula with the fewest steps.
 const CONFLICT_LIMIT: u64 = 2_000;

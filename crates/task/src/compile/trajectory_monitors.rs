@@ -430,7 +430,7 @@ pub(super) fn decided(holds: bool) -> Condition {
     if holds { all([]) } else { any([]) }
 }
 
-fn predicates_of<'c>(condition: &'c Condition, found: &mut FxHashSet<&'c pddl::ast::Name>) {
+fn predicates_of<'c>(condition: &'c Condition, found: &mut FxHashSet<&'c Name>) {
     condition.walk(&mut |node| found.extend(node.atom().map(|atom| &atom.predicate.name)));
 }
 

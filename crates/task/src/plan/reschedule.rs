@@ -26,7 +26,7 @@ pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) ->
     }
     let Some(values) = values(task, &plan.steps) else { return plan };
     let mut position = 0;
-    while position < plan.steps.len() {
+    while position < plan.steps.len() && !limits.reached() {
         let id = plan.steps[position].operator;
         if task.operators[id.index()].wait.is_none() {
             let current_starts = starts(task, &plan.steps);

@@ -4,9 +4,6 @@ use std::fmt;
 
 use crate::plan::solution::{MetricUnbounded, Proof, Solution, Status};
 
-/// The reason is not always a limit: a solver may have failed, or numbers may overflow.
-const NO_PLAN: &str = "no plan was found, and its absence is not proved";
-
 impl Solution {
     /// Returns the status of the solution and its justification: a sentence without a full stop, or two lines
     /// if the metric may have no best value.
@@ -68,10 +65,18 @@ fn verdict(solution: &Solution) -> String {
         (Status::UnsolvableWithinHorizon, _, _) => {
             format!("no plan with up to {}, {proved}; longer plans were not considered", steps(horizon))
         }
-        (Status::Unknown, _, _) => match &solution.lower_bound {
-            Some(bound) => format!("{NO_PLAN}; no plan has a better metric than {bound}"),
-            None => NO_PLAN.to_owned(),
-        },
+        (Status::Unknown, _, _) => {
+            // A failed solver is named separately.
+            let reason = match solution.statistics.failure {
+                Some(_) => "no plan was found, and its absence is not proved",
+                None => "a limit was reached before a plan was found",
+            };
+            match &solution.lower_bound {
+                Some(bound) => format!("{reason}; no plan has a better metric than {bound}"),
+                None if solution.statistics.failure.is_some() => reason.to_owned(),
+                None => format!("{reason}; nothing is proved"),
+            }
+        }
     }
 }
 
