@@ -244,7 +244,7 @@ impl Branch<'_> {
 }
 
 impl<'a> Search<'a> {
-    /// Searches depth-first. The stack is explicit, because a body can have tens of thousands of atoms.
+    /// Searches depth-first. The stack is explicit, because a body can have thousands of atoms.
     fn run(&mut self, start: State) {
         let mut branches: Vec<Branch<'a>> = self.visit(start).into_iter().collect();
         while let Some(mut branch) = branches.pop() {

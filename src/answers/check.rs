@@ -122,7 +122,7 @@ struct StatePart {
 struct ProvedPart {
     #[serde(flatten)]
     value: ValuePart,
-    /// Whether it is proved that no deterministic policy is better.
+    /// Whether it is proved that no deterministic policy is better (in doubles: by more than the bounds permit).
     proved: bool,
 }
 

@@ -7,7 +7,7 @@ use crate::answers::{CheckAnswer, ChecksAnswer};
 use crate::file::source;
 use crate::message::Message;
 use clap::Args;
-use probabilistic::check::{Exactness, Options, Outcome, PolicyTable, Precision, Report, check_all};
+use probabilistic::check::{Answer, Exactness, Options, Outcome, PolicyTable, Precision, Report, check_all};
 use probabilistic::explore::Bounds;
 use probabilistic::prism::ast::Model;
 use probabilistic::property::{Declarations, Listed};
@@ -234,7 +234,11 @@ fn precision(arguments: &Arguments) -> Option<Precision> {
 
 fn is_proved(arguments: &Arguments, report: &Report) -> bool {
     let fits = precision(arguments).is_none_or(|precision| report.outcome.is_within(precision));
-    fits && !matches!(report.outcome, Outcome::Undecided(_))
+    let is_open = matches!(
+        report.outcome,
+        Outcome::Undecided(_) | Outcome::Constrained { randomised: Answer::Undefined, proved: false, .. }
+    );
+    fits && !is_open
 }
 
 fn single(arguments: &Arguments, common: &Common, property: &str, report: &Report) -> Result<Exit, Failure> {

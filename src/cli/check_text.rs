@@ -20,10 +20,15 @@ pub fn as_text(report: &Report, verbose: bool) -> String {
             let rows = vertices.iter().map(|pair| pair.iter().map(shown).collect());
             output::table(&["first", "second"], rows)
         }
+        Outcome::Constrained { randomised: Answer::Undefined, proved: true, .. } => {
+            "undefined: no policy satisfies the bound (proved)\n".to_owned()
+        }
         Outcome::Constrained { randomised, deterministic, proved } => {
             let note = match randomised {
                 _ if *proved => "",
-                Answer::Undefined => " (not proved; use `--exact`)",
+                Answer::Undefined => {
+                    " (not proved in floating-point arithmetic; `--exact` proves it if its budget suffices)"
+                }
                 _ => " (perhaps not the least)",
             };
             format!("randomised: {}\ndeterministic: {}{note}\n", shown(randomised), shown(deterministic))

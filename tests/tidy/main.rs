@@ -102,10 +102,10 @@ fn without_tests(text: &str) -> String {
             let Some(next) = lines.next() else { return code };
             item = next;
         }
-        // An item of several lines ends at the brace with the indentation of the attribute.
-        let end = format!("{indent}}}");
+        // An item of several lines ends at the bracket with the indentation of the attribute.
+        let ends = ["}", "];", ");"].map(|end| format!("{indent}{end}"));
         if !item.ends_with([';', '}', ',']) {
-            lines.by_ref().find(|line| line.starts_with(&end));
+            lines.by_ref().find(|line| ends.iter().any(|end| line.starts_with(end)));
         }
     }
     code
@@ -139,8 +139,9 @@ fn library_part(path: &str, text: &str) -> Option<String> {
 #[test]
 fn only_items_for_tests_are_left_out() {
     let text = "a();\n#[cfg(test)]\nmod tests;\nb();\n    #[cfg(test)]\n    #[must_use]\n    fn c() {\n        d();\n    }\n\
-                e();\n#[cfg(test)] mod f {\n    g();\n}\nh();\n#[cfg(test)]\nfn i() {}\nj();\n";
-    assert_eq!(without_tests(text), "a();\nb();\ne();\nh();\nj();\n");
+                e();\n#[cfg(test)] mod f {\n    g();\n}\nh();\n#[cfg(test)]\nfn i() {}\nj();\n\
+                #[cfg(test)]\nconst K: [u8; 1] = [\n    1,\n];\nl();\n#[cfg(test)]\nconst M: u8 = n(\n    1,\n);\no();\n";
+    assert_eq!(without_tests(text), "a();\nb();\ne();\nh();\nj();\nl();\no();\n");
 }
 
 #[test]

@@ -12,14 +12,17 @@ use num_traits::ToPrimitive;
 use serde_json::{Value, json};
 
 use crate::error::{Diagnostic, Error, Place};
-use crate::prism::TOO_LARGE;
 use crate::prism::ast::{
     BinaryOp, Command, Expr, ExprKind, Function, Model, ModelKind, Module, Named, RewardItem, Rewards, Type,
     Variable,
 };
+use crate::prism::{MAX_DEPTH, MAX_LEVELS};
 
 /// Upper limit on the number of subexpressions of all expressions of a document.
 const MAX_PARTS: usize = 500_000;
+/// The message about a document beyond [`MAX_PARTS`], or about formulas beyond [`MAX_DEPTH`] or [`MAX_LEVELS`].
+const TOO_LARGE: &str = "after the expansion of its formulas, the document would be nested too deeply or have more than \
+                         500,000 subexpressions";
 
 /// Translates a PRISM model to JANI. Undefined constants become parameters of the JANI model.
 ///
@@ -32,7 +35,7 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     if !recursive.is_empty() {
         return Err(Error::Model(recursive.into()));
     }
-    let writer = Writer { model, remaining: Cell::new(MAX_PARTS) };
+    let writer = Writer { model, remaining: Cell::new(MAX_PARTS), open: Cell::new((0, 0)) };
     let mut problems = Vec::new();
     let actions = actions(model);
     let globals = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
@@ -188,6 +191,8 @@ struct Writer<'a> {
     model: &'a Model,
     /// Number of subexpressions that may still be written; at 0, the document is incomplete.
     remaining: Cell<usize>,
+    /// Number of formulas that are being expanded, each inside the one before, and the sum of their levels.
+    open: Cell<(usize, usize)>,
 }
 
 impl Writer<'_> {
@@ -339,7 +344,18 @@ impl Writer<'_> {
             ExprKind::Number(value) => number(value),
             ExprKind::Label(name) => json!(name),
             ExprKind::Name(name) => match self.model.formulas.iter().find(|formula| formula.name == *name) {
-                Some(formula) => self.expression(&formula.expression),
+                Some(formula) => {
+                    let (depth, levels) = self.open.get();
+                    let nested = levels.saturating_add(formula.expression.levels());
+                    if depth >= MAX_DEPTH || nested > MAX_LEVELS {
+                        self.remaining.set(0);
+                        return Value::Null;
+                    }
+                    self.open.set((depth.saturating_add(1), nested));
+                    let value = self.expression(&formula.expression);
+                    self.open.set((depth, levels));
+                    value
+                }
                 None => json!(name),
             },
             ExprKind::Not(inner) => object([("op", "¬".into()), ("exp", self.expression(inner))]),

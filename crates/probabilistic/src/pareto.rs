@@ -50,9 +50,9 @@ pub struct Point<N> {
 pub struct Constrained<N> {
     /// The minimum over randomised policies.
     pub randomised: Bounded<N>,
-    /// The least loss found over deterministic policies whose memory is the set of reached targets,
-    /// and `true` if the minimum is proved (in doubles, to lie within the bounds). `None` if no such policy within the limit was
-    /// found.
+    /// The least loss found over deterministic policies whose memory is the set of reached targets, and `true` if it
+    /// is proved that no such policy is better (in doubles: by more than the bounds permit). `None` if no such
+    /// policy within the limit was found.
     pub deterministic: Option<(Bounded<N>, bool)>,
 }
 
@@ -105,13 +105,13 @@ impl<'a, N: Number> Pareto<'a, N> {
     /// # Errors
     /// Exact arithmetic exceeds its budget.
     pub fn new(mdp: &'a Mdp<N>, objectives: &'a [Objective<N>; 2]) -> Result<Self, Exhausted> {
-        Self::within(mdp, objectives, Work::new(DEFAULT_BUDGET))
+        Self::within(mdp, objectives, &mut Work::new(DEFAULT_BUDGET))
     }
 
     pub(crate) fn within(
         mdp: &'a Mdp<N>,
         objectives: &'a [Objective<N>; 2],
-        mut work: Work<'a>,
+        work: &mut Work<'a>,
     ) -> Result<Self, Exhausted> {
         let n = mdp.states();
         let mut terminal = FixedBitSet::with_capacity(n);
@@ -121,7 +121,7 @@ impl<'a, N: Number> Pareto<'a, N> {
         for (number, objective) in objectives.iter().enumerate() {
             terminal.union_with(&objective.target);
             work.refill();
-            let solution = solve_within(problem(mdp, objective), None, &mut work).ok_or(Exhausted)?;
+            let solution = solve_within(problem(mdp, objective), None, work).ok_or(Exhausted)?;
             alone[number] = match objective.rewards {
                 Some(_) => solution.values,
                 None => solution.values.iter().map(|value| N::one().minus(value)).collect(),
@@ -136,7 +136,12 @@ impl<'a, N: Number> Pareto<'a, N> {
             blocked.set(state, pending);
         }
         terminal.difference_with(&blocked);
-        Ok(Self { mdp, objectives, alone, alone_errors, terminal, blocked, has_costs, work: work.into() })
+        Ok(Self { mdp, objectives, alone, alone_errors, terminal, blocked, has_costs, work: (*work).into() })
+    }
+
+    /// Returns the counters of the work that the computations have spent.
+    pub(crate) fn work(&self) -> Work<'a> {
+        *self.work.borrow()
     }
 
     /// Returns the value of each state as a terminal state, for one objective: its loss from this state on if
@@ -336,12 +341,16 @@ impl<'a, N: Number> Pareto<'a, N> {
     /// Searches for the best deterministic policy within the limit, by branch and bound. A node branches over
     /// the choices of a state in which the policies of two neighbouring vertices differ. The lower bound of a
     /// node is the optimum of randomised policies with its allowed choices. Returns the loss of the best policy
-    /// found, and `true` if it is proved optimal (in doubles: if the optimum is proved to lie within the bounds);
+    /// found, and `true` if it is proved that no policy is better (in doubles: by more than the bounds permit);
     /// `None` if no policy within the limit was found. The search ends after [`MAX_BRANCHES`] nodes.
     fn deterministic(&self, limit: &N) -> Result<Option<(Bounded<N>, bool)>, Exhausted> {
         let mut best: Option<N> = None;
         // Bounds on the first loss: the lower bound holds in all pruned nodes.
         let (mut lower, mut upper) = (f64::INFINITY, f64::INFINITY);
+        // The first loss of the policy that gives the upper bound.
+        let mut kept: Option<N> = None;
+        // Lower bound on the first loss in the nodes in which it is not decided whether a policy is within the limit.
+        let mut undecided = f64::INFINITY;
         let mut choices = FixedBitSet::with_capacity(self.mdp.choice_count());
         choices.insert_range(..);
         let mut open = vec![choices];
@@ -358,7 +367,10 @@ impl<'a, N: Number> Pareto<'a, N> {
                 // In doubles, the loss of a policy is an upper bound only if the policy is proved to be within
                 // the limit.
                 if vertex.losses[1].to_f64() + vertex.errors[1] <= kept_limit(limit.to_f64()) {
-                    upper = upper.min((vertex.losses[0].to_f64() + vertex.errors[0]).next_up());
+                    let bound = (vertex.losses[0].to_f64() + vertex.errors[0]).next_up();
+                    if bound < upper {
+                        (upper, kept) = (bound, Some(vertex.losses[0].clone()));
+                    }
                 }
                 if best.as_ref().is_none_or(|best| vertex.losses[0] < *best) {
                     best = Some(vertex.losses[0].clone());
@@ -366,7 +378,7 @@ impl<'a, N: Number> Pareto<'a, N> {
             }
             let Some((bound, segment)) = lower_hull(&vertices, limit) else {
                 if !vertices.is_empty() && !self.is_infeasible(limit, Some(&allowed))? {
-                    lower = lower.min(self.below(&vertices, None, limit, Some(&allowed))?);
+                    undecided = undecided.min(self.below(&vertices, None, limit, Some(&allowed))?);
                 }
                 continue;
             };
@@ -386,8 +398,13 @@ impl<'a, N: Number> Pareto<'a, N> {
                 open.push(restricted);
             }
         }
-        let proved = is_complete && (N::EXACT || upper.is_finite());
-        Ok(best.map(|value| (Bounded { value, lower: lower.min(upper), upper }, proved)))
+        Ok(best.map(|value| {
+            // In doubles, the best policy may exceed the limit, and its loss may then be below all bounds.
+            let keeps_limit = || kept.is_some_and(|kept| !value.clearly_less(&kept));
+            let proved = is_complete && (N::EXACT || value.to_f64() <= undecided && keeps_limit());
+            let lower = lower.min(undecided).min(upper).min(value.to_f64());
+            (Bounded { value, lower, upper }, proved)
+        }))
     }
 
     /// Returns the first state, in breadth-first order under `policy` before a target is reached,
@@ -464,4 +481,47 @@ fn lower_hull<N: Number>(vertices: &[Point<N>], limit: &N) -> Option<(N, Option<
     let share = a[1].minus(limit).over(&a[1].minus(&b[1]));
     let value = a[0].plus(&share.times(&b[0].minus(&a[0])));
     Some((value, Some((left, right))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Answers the question for the least first loss with a second loss of at most 1000. Each loss has an error of 1e-4.
+    /// Each pair is a policy with its two losses.
+    fn best(policies: &[[f64; 2]]) -> (Bounded<f64>, bool) {
+        let mut mdp = Mdp::default();
+        for _ in policies {
+            mdp.push_transition(1, 1.0);
+            mdp.end_choice(0).expect("few choices");
+        }
+        mdp.end_state();
+        mdp.push_transition(1, 1.0);
+        mdp.end_choice(0).expect("few choices");
+        mdp.end_state();
+        let mut target = FixedBitSet::with_capacity(2);
+        target.insert(1);
+        let objectives = [0, 1].map(|number| {
+            let rewards = policies.iter().map(|losses| losses[number]).chain([0.0]).collect();
+            Objective { rewards: Some(rewards), target: target.clone() }
+        });
+        let mut pareto = Pareto::new(&mdp, &objectives).expect("doubles");
+        pareto.alone_errors = [1e-4; 2];
+        pareto.deterministic(&1000.0).expect("doubles").expect("a policy within the limit")
+    }
+
+    #[test]
+    fn a_policy_that_may_be_within_the_limit_prevents_a_proof() {
+        let (bounded, proved) = best(&[[0.0, 1000.000_05], [5.0, 10.0]]);
+        assert!(bounded.lower <= 0.0 && bounded.upper >= 5.0 && !proved, "{bounded:?}");
+        // The first policy is worse, or certainly beyond the limit.
+        assert!(best(&[[6.0, 1000.000_05], [5.0, 10.0]]).1);
+        assert!(best(&[[0.0, 1000.1], [5.0, 10.0]]).1);
+    }
+
+    #[test]
+    fn a_policy_that_may_exceed_the_limit_is_not_proved_optimal() {
+        let (bounded, proved) = best(&[[1.0, 1000.0], [5.0, 10.0]]);
+        assert!(bounded.lower <= bounded.value && bounded.upper >= 5.0 && !proved, "{bounded:?}");
+    }
 }

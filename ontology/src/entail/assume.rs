@@ -40,9 +40,9 @@ impl Prover {
                 let mut cases = Vec::new();
                 for class in classes {
                     cases.extend(Self::assume(&copy, class, individual, next)?);
-                }
-                if cases.len() > MAX_CASES {
-                    cases = vec![copy];
+                    if cases.len() > MAX_CASES {
+                        return Ok(vec![copy]);
+                    }
                 }
                 return Ok(cases);
             }

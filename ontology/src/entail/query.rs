@@ -42,7 +42,7 @@ impl Prover {
         }
         *budget -= 1;
         if engine.limits().interrupt.as_ref().is_some_and(Interrupt::is_over) {
-            return Err(Error::Interrupted { rule: RuleIdentity::new("the query", 0) });
+            return Err(Error::Interrupted { rule: RuleIdentity::new("conjunctive query", 0) });
         }
         let unknown =
             |axiom: &Axiom| names(axiom).into_iter().filter(|name| is_open(assignment, name)).count();

@@ -10,13 +10,14 @@
 use oxrdf::{BlankNode, NamedOrBlankNode, Term};
 use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 
+use super::swrl::{ORIGIN, Origin};
 use crate::error::Warning;
 use crate::graph::{Graph, iri_of};
-use crate::vocab::{owl, rdf, swrl};
+use crate::vocab::{owl, rdfs, swrl};
 
 const REASON: &str = "an annotation property has no logical axioms; declare it as an object or data property";
 
-pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
+pub(crate) fn rewrite(graph: &mut Graph, origins: &[Origin], warnings: &mut Vec<Warning>) {
     let named = |class: &str| -> HashSet<String> {
         let instances = graph.instances(class).into_iter();
         instances
@@ -67,9 +68,8 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
         if unusable.contains(&triple.subject) {
             // Without its body or head, a rule would have another meaning.
             parts.push(index);
-            if triple.predicate.as_str() == rdf::TYPE {
-                let statement = "a rule with a restriction of an annotation property".to_owned();
-                warnings.push(Warning::Unread { statement, reason: REASON.to_owned() });
+            if triple.predicate.as_str() == ORIGIN {
+                warnings.extend(unread_rule(graph, &triple.subject, &triple.object, origins));
             }
             continue;
         }
@@ -92,6 +92,18 @@ pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     for index in parts {
         graph.take(index);
     }
+}
+
+/// Returns the warning about a removed rule; `origin` is the index of the rule in `origins`.
+fn unread_rule(graph: &Graph, rule: &NamedOrBlankNode, origin: &Term, origins: &[Origin]) -> Option<Warning> {
+    let Term::Literal(index) = origin else { return None };
+    let Origin { ontology, position, .. } = origins.get(index.value().parse::<usize>().ok()?)?;
+    let label = graph.objects(rule, rdfs::LABEL).find_map(|term| match term {
+        Term::Literal(literal) => Some(literal.value().to_owned()),
+        _ => None,
+    });
+    let reason = format!("it contains a restriction of an annotation property; {REASON}");
+    Some(Warning::UnreadRule { ontology: ontology.to_string(), position: *position, label, reason })
 }
 
 /// Adds the blank nodes that contain one of `expressions`, directly or indirectly.

@@ -120,7 +120,7 @@ pub(crate) fn normalize(
     forms::rewrite(&mut graph);
     let disjoint = lists::rewrite(&mut graph, &mut warnings);
     anonymous::rewrite(&mut graph, &mut warnings);
-    annotative::rewrite(&mut graph, &mut warnings);
+    annotative::rewrite(&mut graph, &rules, &mut warnings);
     kinds::declare(&mut graph, undeclared, &mut warnings);
     let mut plain = plain::take(&mut graph, bulk, &mut names);
     plain.axioms.extend(disjoint);

@@ -16,8 +16,9 @@ use crate::source::Source;
 use crate::symbol::{Symbol, Symbols};
 
 const MATCH_LIMIT: usize = 1 << 21;
-/// Upper limit on the number of partial matches of one body. Tests use a lower limit.
-const PARTIAL_MATCH_LIMIT: usize = if cfg!(test) { 1 << 16 } else { 8 * MATCH_LIMIT };
+/// Upper limit on the number of partial matches of one body. It is much above [`MATCH_LIMIT`], because in a correct
+/// derivation most partial matches can fail at a later atom. Tests use a lower limit.
+const PARTIAL_MATCH_LIMIT: usize = if cfg!(test) { 1 << 16 } else { 64 * MATCH_LIMIT };
 
 /// Values of the variables of a rule; `None` for an unbound variable.
 pub(super) type Values = Vec<Option<Symbol>>;

@@ -168,6 +168,12 @@ impl Replayer<'_> {
                     result
                 }
             };
+            if let (Err(_), true, Reason::Rule { identity, .. }) =
+                (&checked, self.matcher.too_many, &step.reason)
+            {
+                // Without all matches, the value of an aggregate is unknown.
+                return Err(Fault::TooMany(identity.clone()));
+            }
             checked.map_err(|reason| Fault::Step { step: position, fact: self.show(&step.fact), reason })?;
             if self.program.equality {
                 is_outdated |=

@@ -74,8 +74,8 @@ pub enum Outcome {
         randomised: Answer,
         /// The best value found over deterministic policies; undefined if no policy was found.
         deterministic: Answer,
-        /// `true` if the deterministic value is proved optimal, or if it is proved that no policy satisfies the
-        /// bound.
+        /// `true` if it is proved that no deterministic policy is better (in doubles: by more than the bounds
+        /// permit), or that no policy satisfies the bound.
         proved: bool,
     },
 }

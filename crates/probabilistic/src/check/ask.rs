@@ -5,7 +5,8 @@ use crate::error::{Diagnostic, Error, Place};
 #[derive(Debug)]
 pub enum Stop {
     Wrong(Error),
-    /// Exact arithmetic exceeds its budget, so the caller solves the property in floating-point arithmetic.
+    /// Exact arithmetic exceeds its budget, so the caller solves the property in floating-point arithmetic; or the
+    /// caller has cancelled the computation.
     TooMuchWork,
 }
 
@@ -17,7 +18,8 @@ impl From<Error> for Stop {
 
 pub type Checked<T> = Result<T, Stop>;
 
-/// Converts the result of a computation in exact arithmetic. `None` means that its budget is exceeded.
+/// Converts the result of a computation. `None` means that exact arithmetic exceeds its budget, or that the caller has
+/// cancelled the computation.
 pub fn within_budget<T>(result: Option<T>) -> Checked<T> {
     result.ok_or(Stop::TooMuchWork)
 }

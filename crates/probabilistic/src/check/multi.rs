@@ -23,9 +23,11 @@ impl<N: Number> Query<'_, N> {
             return Err(property_error("Q403", place, "one objective of `multi` must ask for a value").into());
         }
         let objectives = [self.objective(first)?, self.objective(second)?];
-        let Ok(pareto) = Pareto::within(self.mdp(), &objectives, *self.work.borrow()) else {
-            return Err(Stop::TooMuchWork);
-        };
+        // The copies share the request to cancel with the query, which otherwise would be answered in doubles.
+        let mut work = *self.work.borrow();
+        let pareto = Pareto::within(self.mdp(), &objectives, &mut work);
+        self.work.borrow_mut().continue_from(&work);
+        let Ok(pareto) = pareto else { return Err(Stop::TooMuchWork) };
         let answer_of = |number: usize, loss: &N, error: f64| {
             let value = match objectives[number].rewards {
                 Some(_) => loss.clone(),
@@ -37,7 +39,9 @@ impl<N: Number> Query<'_, N> {
         if let Some((_, bound)) = bound_of(second) {
             let bound = N::from_rational(&self.constant(bound)?);
             let limit = if objectives[1].rewards.is_some() { bound } else { N::one().minus(&bound) };
-            let Ok(optimum) = pareto.constrained(&limit) else { return Err(Stop::TooMuchWork) };
+            let optimum = pareto.constrained(&limit);
+            self.work.borrow_mut().continue_from(&pareto.work());
+            let Ok(optimum) = optimum else { return Err(Stop::TooMuchWork) };
             let constrained_answer = |bounded: Bounded<N>| {
                 if N::EXACT {
                     return answer_of(0, &bounded.value, 0.0);
@@ -47,7 +51,9 @@ impl<N: Number> Query<'_, N> {
             };
             return Ok(constrained(optimum, constrained_answer));
         }
-        let Ok(vertices) = pareto.vertices(None) else { return Err(Stop::TooMuchWork) };
+        let vertices = pareto.vertices(None);
+        self.work.borrow_mut().continue_from(&pareto.work());
+        let Ok(vertices) = vertices else { return Err(Stop::TooMuchWork) };
         let pairs = vertices.iter().map(|vertex| {
             [0, 1].map(|number| answer_of(number, &vertex.losses[number], vertex.errors[number]))
         });

@@ -36,9 +36,11 @@ pub fn apply<N: Number>(
 ) -> Option<Stepped<N>> {
     let mdp = problem.mdp;
     let (mut widest, mut lost) = (1, false);
+    // Exact arithmetic is slower, so the callback is called after fewer transitions.
+    let entries = mdp.transition_count().saturating_mul(if N::EXACT { 64 } else { 1 });
     for _ in 0..steps {
         // Exploration of a tiny process ends at once, but its steps can take hours.
-        work.poll(mdp.transition_count())?;
+        work.poll(entries)?;
         let mut next = values.clone();
         for state in (0..mdp.states()).filter(|state| !problem.is_sink(*state)) {
             let mut best: Option<N> = None;

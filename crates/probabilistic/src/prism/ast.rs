@@ -449,6 +449,28 @@ impl Expr {
         Self::new(ExprKind::Binary(op, Box::new(self), Box::new(other)))
     }
 
+    /// Returns the number of nested levels: 1 for a name or a number. Does not descend into properties and path
+    /// formulas.
+    pub(crate) fn levels(&self) -> usize {
+        let (mut stack, mut deepest) = (vec![(self, 1_usize)], 0);
+        while let Some((part, level)) = stack.pop() {
+            deepest = deepest.max(level);
+            let mut push = |operand| stack.push((operand, level.saturating_add(1)));
+            match &part.kind {
+                ExprKind::Not(inner) | ExprKind::Negative(inner) => push(inner),
+                ExprKind::Binary(_, left, right) => {
+                    [left, right].into_iter().for_each(|operand| push(operand))
+                }
+                ExprKind::If(condition, then, otherwise) => {
+                    [condition, then, otherwise].into_iter().for_each(|operand| push(operand));
+                }
+                ExprKind::Call(_, arguments) => arguments.iter().for_each(push),
+                _ => {}
+            }
+        }
+        deepest
+    }
+
     /// Appends the names of constants, formulas and variables in the expression, each with its
     /// position. Does not descend into properties and path formulas.
     pub fn names<'a>(&'a self, occurrences: &mut Vec<(&'a str, Place)>) {

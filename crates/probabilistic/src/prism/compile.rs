@@ -33,6 +33,9 @@ pub struct Names {
 
 /// Upper limit on the nesting depth of an expression, with formulas expanded.
 pub const MAX_DEPTH: usize = 250;
+/// Upper limit on the sum of the levels of formulas that are expanded inside each other. It is slightly above the number
+/// of levels that the parser admits, so that recursion over an expanded expression needs no larger stack.
+pub const MAX_LEVELS: usize = 25_000;
 /// Upper limits on the number of subexpressions: in one top-level expression, and in all expressions together.
 pub const MAX_PARTS: [usize; 2] = [200_000, 5_000_000];
 /// The message about an expression beyond [`MAX_DEPTH`] or [`MAX_PARTS`].

@@ -27,7 +27,7 @@ mod write;
 
 pub(crate) use code::Code;
 pub use compile::Settings;
-pub(crate) use compile::{Names, TOO_LARGE};
+pub(crate) use compile::{MAX_DEPTH, MAX_LEVELS, Names};
 pub use model::Program;
 pub use parser::parse;
 pub(crate) use parser::{constant_declaration, named_expression};

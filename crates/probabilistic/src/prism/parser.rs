@@ -6,7 +6,7 @@ use crate::prism::ast::{
 };
 use crate::prism::expression::{Cursor, Read};
 use crate::prism::lexer::{Kind, Token, tokens};
-use crate::prism::rename;
+use crate::prism::rename::{self, Formulas};
 
 /// Parses a PRISM model.
 ///
@@ -37,7 +37,7 @@ pub fn parse(text: &str) -> Result<Model, Error> {
     };
     let mut problems = Vec::new();
     let mut kind = None;
-    let formulas = formulas(&tokens);
+    let formulas = Formulas::new(formulas(&tokens));
     while *cursor.peek() != Kind::End {
         let before = cursor.position();
         if let Err(problem) = part(&mut cursor, &mut model, &mut kind, &formulas, &mut problems) {
@@ -81,7 +81,7 @@ fn part(
     cursor: &mut Cursor<'_>,
     model: &mut Model,
     kind: &mut Option<ModelKind>,
-    formulas: &[Named],
+    formulas: &Formulas,
     problems: &mut Vec<Diagnostic>,
 ) -> Read<()> {
     let place = cursor.place();
@@ -223,7 +223,7 @@ fn variable(cursor: &mut Cursor<'_>) -> Read<Variable> {
 fn module(
     cursor: &mut Cursor<'_>,
     model: &mut Model,
-    formulas: &[Named],
+    formulas: &Formulas,
     problems: &mut Vec<Diagnostic>,
 ) -> Read<()> {
     cursor.advance();

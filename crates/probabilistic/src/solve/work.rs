@@ -78,7 +78,7 @@ impl<'p> Work<'p> {
         (self.remaining, self.spare) = (DEFAULT_BUDGET, SPARE_BUDGET);
     }
 
-    /// Takes over the counters of a copy that was spent.
+    /// Adopts the counters of a copy.
     pub const fn continue_from(&mut self, copy: &Work<'_>) {
         self.remaining = copy.remaining;
         self.entries_until_call = copy.entries_until_call;
