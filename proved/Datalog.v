@@ -49,6 +49,7 @@ Definition satisfies (test : built_in) (a b : symbol) : bool :=
   | Different, Name _, Name _ => false
   | Different, _, _ => negb (symbol_eqb a b)
   | Outside d, Literal x, _ => negb (in_datatype x d)     (* the second argument is ignored *)
+  | Outside _, Name _, _ => true                   (* no individual is a value of a datatype *)
   | _, _, _ => false                               (* no value has this kind *)
   end.
 

@@ -2,7 +2,8 @@
    has a conclusion that is missing. Theorem [knowledge]: then exactly the claimed facts hold.
 
    Not covered, and therefore not accepted: individuals with several names; rules of which an argument does not
-   occur in a positive premise; rules that are not stratified, or equality that depends on negation. *)
+   occur in a positive premise, if the positive premises have a match; rules that are not stratified, or equality that
+   depends on negation. *)
 From Coq Require Import ZArith QArith List Bool FMapPositive Lia.
 From Proved Require Import Task Lifted Datalog.
 Import ListNotations.

@@ -224,6 +224,9 @@ unknown derivations.json 's/"fact":\[27,3,1\]/"fact":[27,3,5]/' 'not proved'
 unknown derivations.json 's/{"fact":\[27,1,3\]}/{"fact":[27,1,3]},{"fact":[22,1,3]}/' 'not proved'
 unknown derivations.json 's/"supports":\[57\]/"supports":[58]/' 'not proved'
 unknown derivations.json 's/"supports":\[57\]/"supports":[56]/' 'not proved'
+# Two facts that support each other
+unknown derivations.json 's/\]}$/,{"fact":[27,5,6],"supports":[60]},{"fact":[27,6,5],"supports":[59]}]}/' 'not proved'
+unknown derivations.json 's/"supports":\[57\]/"supports":[-1]/' 'rejected: derivations.json: no step -1'
 unknown derivations.json 's/\["2.5"/["2.6"/' 'not proved'
 unknown derivations.json 's/\["2.5"/["2.50"/' 'proved: exactly the 59 facts hold, 41 of them by rules'
 # The rules or the stated facts are others.
@@ -242,6 +245,59 @@ unknown knowledge.nt '/"7"/s/"7"/"high"/; /"high"/s/#integer/#string/' 'not prov
 unknown knowledge.nt '/#pressure/s/"7"/"7.5"/' 'rejected: not covered: the value 7.5 of the datatype <http://www.w3.org/2001/XMLSchema#integer>'
 # Two pumps that back up the same one would be one.
 unknown knowledge.nt 's/^\(.*#p1> .*#backup> .*#\)p2> \.$/&\n\1v1> ./' 'not proved'
+# Statements that a reader could lose: behind the end of a statement, or of a line that ends with CR
+loop='<http://example.org/pumps#p1> <http://example.org/pumps#feeds> <http://example.org/pumps#p1> .'
+unknown knowledge.nt "1s|\$| $loop|" 'rejected: N-Triples: line 1: a statement is expected'
+unknown knowledge.nt "\$s|\$|\r$loop|" 'not proved'
+unknown knowledge.nt "1s|^|# comment\r$loop\r|" 'not proved'
+unknown knowledge.nt '1s/^/\r\n/; s/$/\r/' 'proved: exactly the 59 facts hold, 41 of them by rules'
+# Names of other namespaces that end like axioms or datatypes
+unknown knowledge.nt 's/rdf-schema#subClassOf/owl#subClassOf/; s/2000\/01\/owl/2002\/07\/owl/' \
+  'rejected: not covered: <http://www.w3.org/2002/07/owl#subClassOf>, which is not declared as a property of one kind'
+unknown knowledge.nt 's/2002\/07\/owl#disjointWith/2000\/01\/rdf-schema#disjointWith/' \
+  'rejected: not covered: <http://www.w3.org/2000/01/rdf-schema#disjointWith>, which is not declared as a property of one kind'
+unknown knowledge.nt '8s/<[^>]*#range>/<range>/' 'rejected: N-Triples: line 8: a statement is expected'
+unknown knowledge.nt 's/"1.0"^^<[^>]*>/"1.0"^^<decimal>/' 'rejected: not covered: the value 1.0 of the datatype <decimal>'
+unknown knowledge.nt '/#p1>.*#Named/s/<[^>]*#NamedIndividual>/<NamedIndividual>/' 'rejected: N-Triples: line 23: a statement is expected'
+# Types of nodes of a list, and of a set of values. Messages number blank nodes by their first occurrence.
+type='<http://www.w3.org/1999/02/22-rdf-syntax-ns#type>'
+unknown knowledge.nt "\$s|\$|\n_:d0b1 $type <http://example.org/pumps#Pump> .|" \
+  'rejected: not covered: http://www.w3.org/1999/02/22-rdf-syntax-ns#type of d0b2'
+unknown knowledge.nt "\$s|\$|\n_:d0b0 $type <http://example.org/pumps#Pump> .|" \
+  'rejected: not covered: http://www.w3.org/1999/02/22-rdf-syntax-ns#type of d0b0'
+unknown knowledge.nt "\$s|\$|\n_:d0b1 $type <http://www.w3.org/1999/02/22-rdf-syntax-ns#List> .|" \
+  'proved: exactly the 59 facts hold, 41 of them by rules'
+unknown knowledge.nt 's/^\(_:d0b3 .*#rest> \).*/\1_:d0b1 ./' 'rejected: not covered: a list that contains itself, d0b2'
+# Numbers
+unknown knowledge.nt 's/"0.5"/"+-0.5"/' 'rejected: not a decimal: +-0.5'
+unknown knowledge.nt 's/"0.5"/"+0.5"/' 'proved: exactly the 59 facts hold, 41 of them by rules'
+unknown knowledge.nt 's/"0.5"^^/"0.5"^:/' 'rejected: N-Triples: line 57: a statement is expected'
+# A message has one line.
+unknown knowledge.nt 's/#subPropertyOf/&\\u000Aproved: /' \
+  'rejected: not covered: <http://www.w3.org/2000/01/rdf-schema#subPropertyOf proved: >, which is not declared as a property of one kind'
+# A step that is written twice counts once.
+unknown derivations.json 's/{"fact":\[27,3,1\][^}]*}/&,&/' 'proved: exactly the 59 facts hold, 41 of them by rules'
+# Fields that are unknown or missing, or written twice
+unknown origin.json 's/"added":\[\],"removed":\[\]/"add":[]/' 'rejected: JSON: unknown field add'
+unknown origin.json 's/"added":\[\],//' 'rejected: JSON: no field added'
+unknown origin.json 's/"shipped"/"extra":0,"shipped"/' 'rejected: JSON: unknown field extra'
+unknown origin.json 's/"shipped"/"names":{},"names":{},"shipped"/' 'rejected: JSON: field names is written twice'
+unknown origin.json 's/"rules":\(.*\),"shipped"/"shipped"/' 'rejected: JSON: no field rules'
+unknown derivations.json 's/"supports":\[57\]/"support":[57]/' 'rejected: JSON: unknown field support'
+unknown origin.json 's/"domain":"/"domain":"\\ud83d\\u0041/' 'rejected: JSON: a low surrogate is expected at byte 23'
+# A label stands before a rule, on one line.
+unknown origin.json 's/\[never\]/[never\\n:upstream(?d, ?e) -> .\\n x]/' 'rejected: rules: ] is missing in a line'
+unknown origin.json 's/\[never\] :upstream/:upstream[never] /' 'rejected: rules: ( is expected'
+unknown origin.json 's/-> :balanced/-> [same] :balanced/' 'rejected: rules: a name is expected'
+unknown origin.json 's/<http:..example.org.pumps#>/<http:\\n>/' 'rejected: rules: > is missing in a line'
+# An individual is not a value of a data property.
+individual='{"predicate":"http:\/\/example.org\/pumps#alarm","arguments":[{"name":"http:\/\/example.org\/pumps#p1"},{"name":"http:\/\/example.org\/pumps#p2"}]}'
+rm -rf "$temporary/individual"
+cp -r "$directory" "$temporary/individual"
+sed "s/\"added\":\[\]/\"added\":[$individual]/" "$directory/origin.json" >"$temporary/individual/origin.json"
+directory=$temporary/individual
+unknown derivations.json 's/\]}$/,{"fact":[20,1,3]}]}/' 'not proved'
+directory=tests/pumps
 # Constructs that are not covered
 unknown origin.json 's/lessThanOrEqual(/matches(/' 'rejected: not covered: the built-in matches'
 unknown origin.json 's/0 = count { /?n = count { /' 'rejected: not covered: an aggregate other than a number of matches'

@@ -10,16 +10,20 @@ let check directory =
   let steps = Knowledge.derivations (read "derivations.json") in
   if Checker.check_derivations knowledge_base (Knowledge.levels knowledge_base) steps then begin
     let facts = List.sort_uniq compare (List.map fst steps) in
-    let derived = List.filter (fun (_, reason) -> reason <> Checker.Stated) steps in
+    let is_derived (_, reason) = reason <> Checker.Stated in
+    let derived = List.sort_uniq compare (List.map fst (List.filter is_derived steps)) in
     Printf.printf "proved: exactly the %d facts hold, %d of them by rules\n" (List.length facts) (List.length derived);
     0
   end
   else (print_endline "not proved"; 30)
 
+(* Names in messages may contain line ends, but only a proved statement may start a line with "proved:". *)
+let print_reason message = Printf.printf "rejected: %s\n" (String.map (fun c -> if c < ' ' then ' ' else c) message)
+
 let () =
   match Sys.argv with
   | [| _; directory |] ->
     exit (try check directory with
-      | Reader.Rejected message | Sys_error message -> Printf.printf "rejected: %s\n" message; 3
-      | error -> Printf.printf "rejected: %s\n" (Printexc.to_string error); 3)
+      | Reader.Rejected message | Sys_error message -> print_reason message; 3
+      | error -> print_reason (Printexc.to_string error); 3)
   | _ -> prerr_endline "usage: metaplan-proved-knowledge CERTIFICATE"; exit 2

@@ -5166,7 +5166,7 @@ let satisfies test a b =
      | Literal _ -> negb (symbol_eqb a b))
   | Outside d ->
     (match a with
-     | Name _ -> false
+     | Name _ -> true
      | Literal x -> negb (in_datatype x d))
 
 type argument0 =

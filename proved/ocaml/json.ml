@@ -38,10 +38,11 @@ let json text =
          | '"' | '\\' | '/' -> Buffer.add_char buffer escape
          | 'u' ->
            let first = code () in
-           let is_pair = first land 0xfc00 = 0xd800 && peek () = '\\' in
-           if is_pair then begin
-             position := !position + 2;
-             add_character buffer (0x10000 + ((first land 0x3ff) lsl 10) + (code () land 0x3ff))
+           if first land 0xfc00 = 0xd800 then begin
+             constant "\\u" ();
+             let second = code () in
+             if second land 0xfc00 <> 0xdc00 then fail "a low surrogate";
+             add_character buffer (0x10000 + ((first land 0x3ff) lsl 10) + (second land 0x3ff))
            end
            else add_character buffer first
          | _ -> fail "an escape");
@@ -85,4 +86,12 @@ let optional object_ name = match object_ with
      | _ -> Reader.reject "JSON: field %s is written twice" name)
   | _ -> Reader.reject "JSON: an object is expected"
 let field object_ name = match optional object_ name with Some item -> item | None -> Reader.reject "JSON: no field %s" name
-let items object_ name = match optional object_ name with Some item -> array item | None -> []
+(* Rejects an object without one of the [required] fields, with a field that is neither required nor [permitted], or
+   with a field that is written twice. *)
+let check_fields item required permitted = match item with
+  | Object fields ->
+    List.iter (fun (name, _) ->
+      if not (List.mem name (required @ permitted)) then Reader.reject "JSON: unknown field %s" name;
+      ignore (optional item name)) fields;
+    List.iter (fun name -> ignore (field item name)) required
+  | _ -> Reader.reject "JSON: an object is expected"

@@ -24,8 +24,10 @@ let is_reserved name = List.exists (fun prefix -> starts prefix name)
 let plain name = if is_reserved name then reject "not covered: <%s>" name else name_key name
 
 let literal text datatype =
-  let number () = C.Numeric (decimal (if starts "+" text then String.sub text 1 (String.length text - 1) else text)) in
-  match if starts xsd datatype then local xsd datatype else datatype with
+  let number () =
+    if starts "+-" text then reject "not a decimal: %s" text;
+    C.Numeric (decimal (if starts "+" text then local "+" text else text)) in
+  match if starts xsd datatype then local xsd datatype else "" with
   | "string" -> C.Text (List.map (fun c -> integer (Char.code c)) (List.of_seq (String.to_seq text)))
   | "boolean" ->
     (match text with
@@ -70,13 +72,20 @@ let triple number line =
   let node () =
     skip ();
     match peek () with
-    | '<' -> Iri (until '>')
+    | '<' ->
+      let iri = until '>' in
+      if not (String.contains iri ':') then fail ();                (* a relative IRI *)
+      Iri iri
     | '_' -> Blank (word ())
     | '"' ->
       let text = until '"' in
       (match peek () with
        | '@' -> ignore (word ()); Annotation
-       | '^' -> position := !position + 2; if peek () = '<' then Value (literal text (until '>')) else fail ()
+       | '^' ->
+         incr position;
+         if peek () <> '^' then fail ();
+         incr position;
+         if peek () = '<' then Value (literal text (until '>')) else fail ()
        | _ -> Value (literal text (xsd ^ "string")))
     | _ -> fail () in
   skip ();
@@ -87,12 +96,16 @@ let triple number line =
     let value = node () in
     skip ();
     if peek () <> '.' then fail ();
+    incr position; skip ();
+    if peek () <> '\n' && peek () <> '#' then fail ();
     Some (subject, predicate, value)
   end
 
 (* Rules as text: SWRL with [not] and [count] *)
 
 type token = Mark of string | Full of string | Name of string | Logical of string | Quoted of string | Numeral of string
+
+let label = "[...]"
 
 let tokens text =
   let length = String.length text in
@@ -106,15 +119,22 @@ let tokens text =
   let closing close i = match String.index_from_opt text i close with
     | Some j -> j
     | None -> reject "rules: %c is missing" close in
+  let closing_in_line close i =
+    let j = closing close i in
+    if String.contains (between i j) '\n' then reject "rules: %c is missing in a line" close;
+    j in
   let rec next i found =
     let mark length = next (i + length) (Mark (between i (i + length)) :: found) in
     if i >= length then List.rev found
     else match text.[i] with
       | ' ' | '\n' | '\t' | '\r' -> next (i + 1) found
       | '#' -> next (scan_while (fun c -> c <> '\n') i) found
-      | '?' -> let j = scan_while is_part (i + 1) in next j (Logical (between (i + 1) j) :: found)
-      | '<' -> let j = closing '>' i in next (j + 1) (Full (between (i + 1) j) :: found)
-      | '[' -> next (closing ']' i + 1) found                     (* a label *)
+      | '?' ->
+        let j = scan_while is_part (i + 1) in
+        if j = i + 1 then reject "rules: a variable without a name";
+        next j (Logical (between (i + 1) j) :: found)
+      | '<' -> let j = closing_in_line '>' i in next (j + 1) (Full (between (i + 1) j) :: found)
+      | '[' -> let j = closing_in_line ']' i in next (j + 1) (Mark label :: found)
       | '"' ->
         let j = closing '"' (i + 1) in
         let content = between (i + 1) j in
@@ -221,8 +241,9 @@ let rules text =
       ignore (accept (Mark "."));
       prefixes := (String.sub prefix 0 (String.length prefix - 1), iri) :: !prefixes;
       read found
-    | first :: _ ->
-      let premises = if first = Mark "->" then [] else separated premise ["^"; ","] in
+    | _ ->
+      ignore (accept (Mark label));
+      let premises = match !input with Mark "->" :: _ -> [] | _ -> separated premise ["^"; ","] in
       expect "->";
       let is_constraint = match !input with [] | Mark "." :: _ -> true | _ -> false in
       let conclusions = if is_constraint then [] else separated (fun () -> C.Concludes (pattern ())) ["^"; ","] in
@@ -237,7 +258,10 @@ let annotations =
 let at_most_listed = 16                     (* larger sets of disjoint classes are not covered *)
 
 let document text =
-  let triples = List.filter_map Fun.id (List.mapi (fun i line -> triple (i + 1) line) (String.split_on_char '\n' text)) in
+  (* LF, CR and CR LF end a line. *)
+  let lines = List.concat (List.mapi (fun i line ->
+    List.map (fun part -> i + 1, part) (String.split_on_char '\r' line)) (String.split_on_char '\n' text)) in
+  let triples = List.filter_map (fun (number, line) -> triple number line) lines in
   (* Blank nodes are numbered by their first occurrence, as in the derivations. *)
   let labels = Hashtbl.create 50 in
   let numbered = function
@@ -285,15 +309,21 @@ let document text =
   let field node name items = match List.filter (fun (predicate, _) -> predicate = name) items with
     | [_, value] -> value
     | _ -> reject "not covered: %s has not one %s" (show node) name in
-  let only node allowed items = List.iter (fun (predicate, _) ->
-    if not (List.mem predicate ((rdf ^ "type") :: allowed)) then reject "not covered: %s of %s" predicate (show node)) items in
-  let rec members node =
-    if node = Iri (rdf ^ "nil") then [] else begin
-      let items = described node in
-      only node [rdf ^ "first"; rdf ^ "rest"] items;
-      let first = field node (rdf ^ "first") items in
-      first :: members (field node (rdf ^ "rest") items)
-    end in
+  (* Rejects types other than [kinds], and predicates other than [allowed]. *)
+  let only node kinds allowed items = List.iter (fun (predicate, value) ->
+    let is_allowed =
+      if predicate = rdf ^ "type" then List.exists (fun kind -> value = Iri kind) kinds else List.mem predicate allowed in
+    if not is_allowed then reject "not covered: %s of %s" predicate (show node)) items in
+  let members list =
+    let rec after visited node =
+      if node = Iri (rdf ^ "nil") then [] else begin
+        if List.mem node visited then reject "not covered: a list that contains itself, %s" (show node);
+        let items = described node in
+        only node [rdf ^ "List"; swrl ^ "AtomList"] [rdf ^ "first"; rdf ^ "rest"] items;
+        let first = field node (rdf ^ "first") items in
+        first :: after (node :: visited) (field node (rdf ^ "rest") items)
+      end in
+    after [] list in
   let disjoint classes =
     if List.length classes > at_most_listed then reject "not covered: more than %d disjoint classes" at_most_listed;
     List.iteri (fun i a -> List.iteri (fun j b -> if i < j then rule [C.Present (a, [x]); C.Present (b, [x])] []) classes) classes in
@@ -307,7 +337,7 @@ let document text =
       violated [C.Test (C.Outside kind, y, y)]
     | Blank _ ->
       let items = described node in
-      only node [owl ^ "oneOf"] items;
+      only node [rdfs ^ "Datatype"; owl ^ "DataRange"] [owl ^ "oneOf"] items;
       violated (List.map (function
         | Value value -> C.Test (C.Different, y, constant value)
         | other -> reject "not covered: %s in a list of values" (show other)) (members (field node (owl ^ "oneOf") items)))
@@ -323,7 +353,7 @@ let document text =
     let atom node =
       let items = described node in
       let get name = field node (swrl ^ name) items in
-      let only names = only node (List.map (fun name -> swrl ^ name) names) items in
+      let only names = only node (types node) (List.map (fun name -> swrl ^ name) names) items in
       match types node with
       | [kind] when kind = swrl ^ "ClassAtom" ->
         only ["classPredicate"; "argument1"];
@@ -338,7 +368,7 @@ let document text =
          | [x; y] when starts swrlb name -> comparison (local swrlb name) x y
          | _ -> reject "not covered: the built-in <%s>" name)
       | _ -> reject "not covered: an atom of a rule, %s" (show node) in
-    only node ([swrl ^ "body"; swrl ^ "head"] @ annotations) items;
+    only node (types node) ([swrl ^ "body"; swrl ^ "head"] @ annotations) items;
     let conclusion node = match atom node with
       | C.Present pattern -> C.Concludes pattern
       | _ -> reject "not covered: a built-in as a conclusion" in
@@ -349,7 +379,7 @@ let document text =
     let equates premises = rule (List.map (fun premise -> C.Present premise) premises) [C.Equates (y, z)] in
     let is_object () = snd (property (only_iri subject)) = "ObjectProperty" in
     let object_only () = if not (is_object ()) then reject "not covered: <%s> of %s" kind (show subject) in
-    match if starts owl kind then local owl kind else kind with
+    match if starts owl kind then local owl kind else "" with
     | "Ontology" | "Class" | "ObjectProperty" | "DatatypeProperty" | "AnnotationProperty" | "NamedIndividual" ->
       ignore (only_iri subject); ignore (name_node subject)
     | "FunctionalProperty" when is_object () -> equates [p (), [x; y]; p (), [x; z]]
@@ -359,7 +389,7 @@ let document text =
     | "TransitiveProperty" -> object_only (); implies [p (), [x; y]; p (), [y; z]] (p (), [x; z])
     | "AllDisjointClasses" ->
       let items = described subject in
-      only subject [owl ^ "members"] items;
+      only subject (types subject) [owl ^ "members"] items;
       disjoint (List.map class_node (members (field subject (owl ^ "members") items)))
     | _ when kind = swrl ^ "Imp" -> swrl_rule subject
     | _ when kind = swrl ^ "Variable" -> ()
@@ -369,28 +399,29 @@ let document text =
   List.iter (fun (subject, predicate, value) ->
     if top subject then
       let is_rule = List.mem (swrl ^ "Imp") (types subject) and is_set = List.mem (owl ^ "AllDisjointClasses") (types subject) in
-      match if starts rdfs predicate then local rdfs predicate else if starts owl predicate then local owl predicate else predicate with
+      let name_in prefix = if starts prefix predicate then local prefix predicate else "" in
+      match name_in rdfs, name_in owl with
       | _ when predicate = rdf ^ "type" -> typed subject (only_iri value)
       | _ when is_rule || is_set -> ()                              (* read with the type *)
       | _ when List.mem predicate annotations -> ()
-      | "versionIRI" -> ()
-      | "subClassOf" -> implies [class_node subject, [x]] (class_node value, [x])
-      | "disjointWith" -> disjoint [class_node subject; class_node value]
-      | "equivalentClass" ->
+      | _, "versionIRI" -> ()
+      | "subClassOf", _ -> implies [class_node subject, [x]] (class_node value, [x])
+      | _, "disjointWith" -> disjoint [class_node subject; class_node value]
+      | _, "equivalentClass" ->
         implies [class_node subject, [x]] (class_node value, [x]);
         implies [class_node value, [x]] (class_node subject, [x])
-      | "subPropertyOf" ->
+      | "subPropertyOf", _ ->
         let (p, kind), (q, other) = property (only_iri subject), property (only_iri value) in
         if kind <> other then reject "not covered: properties of different kinds";
         if kind <> "AnnotationProperty" then implies [p, [x; y]] (q, [x; y])
-      | "inverseOf" ->
+      | _, "inverseOf" ->
         let (p, kind), (q, other) = property (only_iri subject), property (only_iri value) in
         if (kind, other) <> ("ObjectProperty", "ObjectProperty") then reject "not covered: the inverse of data";
         implies [p, [x; y]] (q, [y; x]);
         implies [q, [x; y]] (p, [y; x])
-      | "domain" | "range" when snd (property (only_iri subject)) = "AnnotationProperty" -> ()
-      | "domain" -> implies [fst (property (only_iri subject)), [x; y]] (class_node value, [x])
-      | "range" ->
+      | ("domain" | "range"), _ when snd (property (only_iri subject)) = "AnnotationProperty" -> ()
+      | "domain", _ -> implies [fst (property (only_iri subject)), [x; y]] (class_node value, [x])
+      | "range", _ ->
         let p, kind = property (only_iri subject) in
         if kind = "ObjectProperty" then implies [p, [x; y]] (class_node value, [y]) else data_range p value
       | _ ->
@@ -411,7 +442,8 @@ let change item =
     | Object ["name", String name] -> C.Name (plain name)
     | Object ["literal", Array [String text; String datatype]] -> C.Literal (literal text datatype)
     | _ -> reject "origin.json: an argument is expected" in
-  plain (string (field item "predicate")), List.map argument (items item "arguments")
+  check_fields item ["predicate"; "arguments"] [];
+  plain (string (field item "predicate")), List.map argument (array (field item "arguments"))
 
 let knowledge_base document_text origin_text =
   let facts, axioms = document document_text in
@@ -419,31 +451,40 @@ let knowledge_base document_text origin_text =
   let file item = match item with
     | Array [String _; String text] -> rules text
     | _ -> reject "origin.json: a rule file is expected" in
+  check_fields origin ["domain"; "problem"; "bindings"; "rules"; "shipped"; "changes"] ["names"];
   let changes = field origin "changes" in
-  let removed = List.map change (items changes "removed") and added = List.map change (items changes "added") in
+  check_fields changes ["added"; "removed"] [];
+  let listed name = List.map change (array (field changes name)) in
+  let removed = listed "removed" and added = listed "added" in
   { C.stated = List.filter (fun fact -> not (List.mem fact removed)) facts @ added;
-    implications = axioms @ List.concat_map file (items origin "rules"); same_as }
+    implications = axioms @ List.concat_map file (array (field origin "rules")); same_as }
 
 (* The steps of derivations.json: the facts are claimed, their reasons are not believed. *)
 let derivations text =
   let document = json text in
+  check_fields document ["format"; "terms"; "rules"; "steps"] [];
   if field document "format" <> String "metaplan-derivations/1" then reject "derivations.json has another format";
   let term = function
     | String name -> C.Name (name_key name)
     | Array [String text; String datatype] -> C.Literal (literal text datatype)
     | _ -> reject "derivations.json: a term is expected" in
-  let terms = Array.of_list (List.map (fun item -> lazy (term item)) (items document "terms")) in
+  let terms = Array.of_list (List.map (fun item -> lazy (term item)) (array (field document "terms"))) in
   let term item =
     let i = int item in
     if i >= 0 && i < Array.length terms then Lazy.force terms.(i) else reject "derivations.json: no term %d" i in
   let step item =
-    let fact = match List.map term (items item "fact") with
+    check_fields item ["fact"] ["rule"; "bindings"; "supports"];
+    let fact = match List.map term (array (field item "fact")) with
       | C.Name predicate :: arguments -> predicate, arguments
       | _ -> reject "derivations.json: a fact is expected" in
+    let support item =
+      let i = int item in
+      if i < 0 || i = max_int then reject "derivations.json: no step %d" i;
+      positive (i + 1) in
     fact, match optional item "supports" with
     | None -> C.Stated
-    | Some supports -> C.Derived (List.map (fun item -> positive (int item + 1)) (array supports)) in
-  List.map step (items document "steps")
+    | Some supports -> C.Derived (List.map support (array supports)) in
+  List.map step (array (field document "steps"))
 
 (* Levels of the relations: the least ones that Derivations.v accepts, if there are any. Not believed. *)
 let levels { C.implications; same_as; _ } =

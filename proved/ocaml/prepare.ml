@@ -6,6 +6,8 @@ module R = Reader
 
 open Json
 
+(* The items of a field, which may be absent. *)
+let items object_ name = match optional object_ name with Some item -> array item | None -> []
 let nth list i = match List.nth_opt list i with Some item -> item | None -> R.reject "JSON: no position %d" i
 
 (* Text of the evidence *)

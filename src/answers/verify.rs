@@ -29,7 +29,7 @@ struct TheoremPart<'a> {
     parts: &'a [&'static str],
     /// The proved statement, or the reason why nothing is proved.
     message: &'a str,
-    /// For a certificate with a knowledge base: the answer of the proved checker about its derivations.
+    /// If a theorem covers the claim, and the certificate has a knowledge base: the answer of the proved checker about its derivations.
     #[serde(skip_serializing_if = "Option::is_none")]
     derivations: Option<DerivationsPart<'a>>,
 }
@@ -61,8 +61,8 @@ impl<'a> VerifyAnswer<'a> {
     }
 }
 
-/// Formats a line that states which parts the theorem covers, or why it does not apply. With a knowledge base, a line
-/// before it states the same for the derivations.
+/// Formats a line that states which parts the theorem covers, or why it does not apply. If it applies and there is a
+/// knowledge base, a line before it states the same for the derivations.
 pub fn theorem_line(theorem: &Theorem) -> String {
     let mut lines = String::new();
     match theorem {

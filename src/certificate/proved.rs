@@ -32,6 +32,8 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 const MEMORY_LIMIT: u64 = 4 << 20;
 const TIMED: &str = "proved, with timed initial literals: ";
 const UNTIMED: &str = "proved: ";
+/// First words of the statement about the facts of a knowledge base.
+const FACTS: &str = "proved: exactly the ";
 const COVERED_PARTS: [&str; 3] = ["task", "plan", "argument"];
 const COVERED_FRONT_PARTS: [&str; 2] = ["point", "front"];
 const DERIVATIONS: &str = "derivations";
@@ -175,8 +177,9 @@ impl ProvedChecker {
         let mut check = Command::new(&self.knowledge);
         check.arg(directory);
         Ok(match checked(check, KNOWLEDGE, &output, &errors, stop)? {
-            Answer::Accepted(statement) => Ok(statement),
-            Answer::Rejected => Err("not proved".to_owned()),
+            Answer::Accepted(statement) if statement.starts_with(FACTS) => Ok(statement),
+            Answer::Accepted(_) => Err(format!("`{KNOWLEDGE}` prints no statement about the facts")),
+            Answer::Rejected => Err("the proved checker does not accept the derivations".to_owned()),
             Answer::None(reason) => Err(reason),
         })
     }

@@ -67,6 +67,10 @@ fn theorem_covers_the_parts_about_the_pddl_files() {
     assert_eq!(answer["theorem"]["derivations"], json!({"proved": true, "message": message}), "{answer:#}");
 }
 
+/// A program that accepts all derivations.
+#[cfg(unix)]
+const KNOWN: &str = "echo 'proved: exactly the 2 facts hold'";
+
 /// The theorem about the plan also holds if theorem `knowledge` does not apply to the derivations.
 #[test]
 #[cfg(unix)]
@@ -81,8 +85,15 @@ fn answer_about_derivations_is_compared() {
             Some("echo 'rejected: not covered: keys'; exit 3"),
             "derivations NOT proved by a theorem: not covered: keys",
         ),
-        (Some("echo 'not proved'; exit 30"), "derivations NOT proved by a theorem: not proved"),
-        (Some("echo 'proved: exactly'"), "proved: theorem `knowledge` covers the part derivations"),
+        (
+            Some("echo 'not proved'; exit 30"),
+            "derivations NOT proved by a theorem: the proved checker does not accept the derivations",
+        ),
+        (
+            Some("echo 'proved: nothing'"),
+            "derivations NOT proved by a theorem: `metaplan-proved-knowledge` prints no statement about the facts",
+        ),
+        (Some(KNOWN), "proved: theorem `knowledge` covers the part derivations"),
     ] {
         let programs = stubs("echo evidence", check);
         if let Some(script) = script {
@@ -94,10 +105,10 @@ fn answer_about_derivations_is_compared() {
     }
     change(&ugv, "origin.json", &|text| text.replace("lessThan", "greaterThan"));
     let programs = stubs("echo evidence", check);
-    add_stub(programs.path(), "metaplan-proved-knowledge", "echo 'proved: exactly'");
+    add_stub(programs.path(), "metaplan-proved-knowledge", KNOWN);
     let outcome = with_stubs(&ugv, &programs, &[]);
     assert_eq!(outcome.status, 30, "{outcome:#?}");
-    let line = "theorem     failed: the checkers disagree: the proved checker accepts the derivations (proved: exactly)";
+    let line = "theorem     failed: the checkers disagree: the proved checker accepts the derivations (proved: exactly the 2 facts hold)";
     assert!(outcome.stdout.contains(line), "{outcome:#?}");
 }
 
