@@ -512,11 +512,11 @@ mod tests {
 
     #[test]
     fn a_policy_that_may_be_within_the_limit_prevents_a_proof() {
-        let (bounded, proved) = best(&[[0.0, 1000.000_05], [5.0, 10.0]]);
+        let (bounded, proved) = best(&[[0.0, 1_000.000_05], [5.0, 10.0]]);
         assert!(bounded.lower <= 0.0 && bounded.upper >= 5.0 && !proved, "{bounded:?}");
         // The first policy is worse, or certainly beyond the limit.
-        assert!(best(&[[6.0, 1000.000_05], [5.0, 10.0]]).1);
-        assert!(best(&[[0.0, 1000.1], [5.0, 10.0]]).1);
+        assert!(best(&[[6.0, 1_000.000_05], [5.0, 10.0]]).1);
+        assert!(best(&[[0.0, 1_000.1], [5.0, 10.0]]).1);
     }
 
     #[test]

@@ -459,10 +459,13 @@ impl Expr {
             match &part.kind {
                 ExprKind::Not(inner) | ExprKind::Negative(inner) => push(inner),
                 ExprKind::Binary(_, left, right) => {
-                    [left, right].into_iter().for_each(|operand| push(operand))
+                    push(left);
+                    push(right);
                 }
                 ExprKind::If(condition, then, otherwise) => {
-                    [condition, then, otherwise].into_iter().for_each(|operand| push(operand));
+                    push(condition);
+                    push(then);
+                    push(otherwise);
                 }
                 ExprKind::Call(_, arguments) => arguments.iter().for_each(push),
                 _ => {}
