@@ -615,7 +615,7 @@ fn annotation_properties_have_no_logical_axioms() {
 fn rules_with_a_restriction_of_an_annotation_property_are_reported() {
     let head = "@prefix : <http://e.org/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
         @prefix swrl: <http://www.w3.org/2003/11/swrl#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> . \
-        <http://e.org/> a owl:Ontology . :n a owl:AnnotationProperty . :C a owl:Class . :D a owl:Class . \
+        @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . <http://e.org/> a owl:Ontology . :n a owl:AnnotationProperty . :C a owl:Class . :D a owl:Class . \
         :x a swrl:Variable .\n";
     let restriction = "[ a owl:Restriction ; owl:onProperty :n ; owl:allValuesFrom xsd:string ]";
     let atom =

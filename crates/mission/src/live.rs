@@ -148,7 +148,7 @@ impl Mission {
     }
 
     /// Replaces the available designs of a filled problem and returns the domain for that problem. All predicates
-    /// that are bound to availability change. If there is none, the problem is unchanged.
+    /// that are bound to availability change. Without such a predicate, the problem is unchanged.
     ///
     /// `allowed` is called with the name of each design of the knowledge base and its current
     /// availability; the design becomes available if the result is `true`. Designs whose

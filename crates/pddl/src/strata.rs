@@ -146,8 +146,9 @@ mod tests {
             domain(&axioms.iter().map(|(head, body)| ((*head).into(), (*body).into())).collect::<Vec<_>>());
         match (Strata::of(&domain), expected) {
             (Ok(strata), Ok(levels)) => {
-                let found = axioms.iter().map(|(head, _)| strata.level(&Name::new(head)).expect("derived"));
-                assert_eq!(found.collect::<Vec<_>>(), levels, "{axioms:?}");
+                let computed =
+                    axioms.iter().map(|(head, _)| strata.level(&Name::new(head)).expect("derived"));
+                assert_eq!(computed.collect::<Vec<_>>(), levels, "{axioms:?}");
             }
             (Err(NegativeCycle(name)), Err(expected)) => assert_eq!(name.as_str(), expected, "{axioms:?}"),
             (strata, expected) => panic!("{axioms:?}: {strata:?}, expected {expected:?}"),

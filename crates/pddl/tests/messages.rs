@@ -303,7 +303,7 @@ says!(cyclic_types, "place - object dock" => "place - dock dock", @r"
 ");
 says!(a_type_above_object, "dock - place tool" => "dock - place object - dock tool", @r"
     error[P128]: the type `object` is a subtype of itself
-      ┌─ domain.pddl:3:40
+      ┌─ domain.pddl:3:39
       │
     3 │   (:types place - object dock - place object - dock tool)
       │                                       ^^^^^^

@@ -254,22 +254,17 @@ fn preferences_with_durations_in_effects_are_refused() {
     }
 }
 
-/// The planner does not consider durations below the separation. If they are allowed, it claims no optimality.
+/// The planner does not consider durations between 0 and the separation. If they are allowed, it claims no optimality.
 #[test]
-fn no_action_is_shorter_than_the_separation() {
-    for (bounds, status) in [
-        ("(>= ?duration 0.001)", Status::Optimal),
-        ("(>= ?duration 0.0001)", Status::Feasible),
-        ("(>= ?duration 0)", Status::Feasible),
-        ("()", Status::Feasible),
+fn no_positive_duration_is_below_the_separation() {
+    for (bounds, status, cost, plan) in [
+        ("(>= ?duration 0.001)", Status::Optimal, "0.001", "0: (a) [0.001]"),
+        ("(>= ?duration 0.0001)", Status::Feasible, "0.001", "0: (a) [0.001]"),
+        ("(>= ?duration 0)", Status::Feasible, "0", "0: (a) [0]"),
+        ("()", Status::Feasible, "0", "0: (a) [0]"),
     ] {
         let all = domain(&[durative("a", bounds, "(at start (q))", "(at start (not (q))) (at end (g))")]);
-        check(
-            bounds,
-            &all,
-            &problem("(q)", "(g)", "(total-time)"),
-            (status, Some("0.001"), &["0: (a) [0.001]"]),
-        );
+        check(bounds, &all, &problem("(q)", "(g)", "(total-time)"), (status, Some(cost), &[plan]));
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) fn unmet<'p>(
     ground.walk_fluents(&mut |atom| functions.push(atom));
     let mut values: Vec<(String, Option<BigRational>)> = Vec::new();
     for function in functions {
-        // Only quantified variables are left.
+        // The remaining variables are quantified.
         let Some(arguments) = evaluator.arguments(function, &Bindings::default()) else { continue };
         let symbol = evaluator.world.symbol(&function.predicate.name);
         let text = evaluator.world.show(symbol, &arguments);

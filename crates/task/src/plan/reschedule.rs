@@ -54,12 +54,12 @@ fn ids<N>(task: &Task<N>) -> impl Iterator<Item = OperatorId> {
 
 fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
     let operator = &task.operators[id.index()];
-    ids(task).filter(move |other_id| {
-        let other = &task.operators[other_id.index()];
-        *other_id != id
-            && other.schema == operator.schema
-            && other.arguments == operator.arguments
-            && other.slots == operator.slots
+    ids(task).filter(move |candidate_id| {
+        let candidate = &task.operators[candidate_id.index()];
+        *candidate_id != id
+            && candidate.schema == operator.schema
+            && candidate.arguments == operator.arguments
+            && candidate.slots == operator.slots
     })
 }
 

@@ -17,7 +17,7 @@ const MAX_ORDERS: usize = 1_000_000;
 
 /// Returns `true` if simultaneous happenings may violate an over-all condition one after another but not together.
 /// Over-all conditions with disjunctions, comparisons or derived facts are not considered.
-pub(in crate::concurrent) fn may_repair_over_all(concurrent: &TemporalTask) -> bool {
+pub(crate) fn may_repair_over_all(concurrent: &TemporalTask) -> bool {
     orders(concurrent).is_none_or(|orders| is_cyclic(concurrent.task.operators.len(), &orders))
 }
 
