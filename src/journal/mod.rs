@@ -184,7 +184,7 @@ impl Journal {
 
     /// Completes the work that the previous process left unfinished, or makes the first decision in a new journal. Both
     /// may require planning. Returns the answers to the unfinished work, then the effects that still await an
-    /// acknowledgement. These may not have left the program before.
+    /// acknowledgement: it is unknown whether the previous process has output them.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.

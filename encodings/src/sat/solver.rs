@@ -74,8 +74,8 @@ pub trait Solver {
     /// built-in solver finds that the clauses alone are unsatisfiable, the subset is empty; external programs
     /// always return all assumptions.
     fn core(&self) -> &[Lit];
-    /// Returns the value of a variable in the last satisfying assignment; `false` if the variable has no
-    /// value.
+    /// Returns the value of a variable in the assignment that the last call of `solve` has found; `false` if the
+    /// variable has no value in it. Meaningful only if that call answered `Satisfiable`.
     fn value(&self, variable: u32) -> bool;
     /// Returns the number of learnt clauses over all calls, one per conflict; 0 if the solver does
     /// not report them.
