@@ -14,7 +14,7 @@ use crate::table::{Table, check_potential};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepBounds {
     /// The least T that follows from the cost of the first T + 1 steps alone. It does not depend on the values of a
-    /// potential (table of lower bounds on the remaining cost). `None` if it exceeds [`STEP_LIMIT`].
+    /// potential (table of lower bounds on the remaining cost). `None` if it exceeds `STEP_LIMIT`.
     pub spent: Option<usize>,
     /// The least T that follows from the cost of the first T + 1 steps plus the potential. At most `spent`.
     pub potential: usize,
