@@ -219,14 +219,12 @@ impl Adaptation<'_> {
         if self.planner.is_missing {
             return;
         }
-        self.schedule_retry(attempt, &outcome);
         let is_decided = is_necessary && self.interrupt(&reason, need, &mut outcome, answers);
         if self.planner.is_missing {
             return;
         }
-        if outcome.steps.is_none() && self.beliefs.retry.is_none() {
-            self.schedule_retry(attempt, &outcome);
-        }
+        // The interruption may have found that the absence of a plan is not proved.
+        self.schedule_retry(attempt, &outcome);
         if is_decided {
             return;
         }

@@ -176,7 +176,7 @@ fn reader(pipe: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
 /// Kills a process that leads a process group, and the processes that it has started, such as an external SAT
 /// solver: these would keep the pipes open.
 fn kill(child: &mut Child) -> std::io::Result<()> {
-    // Fails if no process of the group is left.
+    // Fails if all processes of the group have ended.
     #[cfg(unix)]
     let _ = rustix::process::kill_process_group(
         rustix::process::Pid::from_child(child),

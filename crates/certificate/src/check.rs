@@ -242,7 +242,7 @@ impl Checker<'_> {
             let state = self.model.state(&label.0, &label.1);
             let paid = &label.2;
             if self.model.holds(&self.model.goal, &state, &[], &[]) {
-                match &self.cost {
+                match self.cost {
                     None => return Err(Fault::Solvable(position)),
                     Some(cost) if paid < cost => return Err(Fault::Goal(position)),
                     Some(_) => {}

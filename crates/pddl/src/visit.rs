@@ -4,9 +4,12 @@
 
 use std::slice::{from_mut, from_ref};
 
+use num_rational::BigRational;
+use num_traits::Zero as _;
+
 use crate::ast::{
-    ActionBody, Atom, Condition, Constraint, Domain, DurationConstraint, Effect, Expression, Preference,
-    Problem, Trajectory,
+    ActionBody, Atom, Condition, Constraint, Domain, DurationConstraint, Effect, Expression, InitialElement,
+    Name, Preference, Problem, Trajectory,
 };
 
 /// A node of the syntax tree.
@@ -54,6 +57,17 @@ impl Problem {
         if let Some(metric) = &self.metric {
             metric.expression.walk(visit);
         }
+    }
+
+    /// Initial values of a function, for all arguments that have one. `total-cost` without a value is 0.
+    #[must_use]
+    pub fn initial_values(&self, function: &Name) -> Vec<BigRational> {
+        let value_of = |element: &InitialElement| match element {
+            InitialElement::Value(atom, value, _) => (atom.predicate.name == *function).then(|| value.clone()),
+            _ => None,
+        };
+        let values: Vec<_> = self.init.iter().filter_map(value_of).collect();
+        if values.is_empty() && *function == Name::new("total-cost") { vec![BigRational::zero()] } else { values }
     }
 }
 

@@ -7,11 +7,14 @@
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 
 use num_traits::ToPrimitive;
+use rustc_hash::FxHashMap;
 use serde_json::{Value, json};
 
 use crate::error::{Diagnostic, Error, Place};
+use crate::graph::visit_components;
 use crate::prism::ast::{
     BinaryOp, Command, Expr, ExprKind, Function, Model, ModelKind, Module, Named, RewardItem, Rewards, Type,
     Variable,
@@ -30,8 +33,7 @@ const TOO_LARGE: &str = "after the expansion of its formulas, the document would
 /// A construct that JANI cannot express (rewards of commands without an action), a formula whose
 /// definition contains itself, or expressions that are too large after the expansion of formulas.
 pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
-    let recursive: Vec<Diagnostic> =
-        model.formulas.iter().filter_map(|formula| recursion(model, formula)).collect();
+    let recursive = recursive_formulas(model);
     if !recursive.is_empty() {
         return Err(Error::Model(recursive.into()));
     }
@@ -155,24 +157,34 @@ fn system(model: &Model, actions: &BTreeMap<&str, Vec<usize>>) -> Value {
     })
 }
 
-/// Returns an error if a formula refers to itself, directly or indirectly, and so cannot be
-/// expanded.
-fn recursion(model: &Model, formula: &Named) -> Option<Diagnostic> {
-    let mut used = Vec::new();
-    formula.expression.names(&mut used);
-    for at in 0.. {
-        let Some((name, _)) = used.get(at).copied() else { break };
-        if name == formula.name {
-            let text = format!("the definition of `{name}` contains `{name}` itself");
-            return Some(Diagnostic::new("Q204", formula.place, text));
+/// Returns an error for each formula that refers to itself, directly or indirectly, and so cannot be expanded.
+fn recursive_formulas(model: &Model) -> Vec<Diagnostic> {
+    let positions: FxHashMap<&str, u32> =
+        model.formulas.iter().zip(0..).map(|(formula, position)| (&formula.name[..], position)).collect();
+    let references: Vec<Vec<u32>> = model
+        .formulas
+        .iter()
+        .map(|formula| {
+            let mut names = Vec::new();
+            formula.expression.names(&mut names);
+            names.iter().filter_map(|(name, _)| positions.get(name).copied()).collect()
+        })
+        .collect();
+    let mut is_recursive = vec![false; references.len()];
+    let edges = |position: u32| &references[position as usize][..];
+    let Ok(()) = visit_components(references.len(), edges, |component| {
+        let is_cyclic = component.len() > 1 || edges(component[0]).contains(&component[0]);
+        for position in component {
+            is_recursive[*position as usize] = is_cyclic;
         }
-        if !used[..at].iter().any(|(earlier, _)| *earlier == name)
-            && let Some(inner) = model.formulas.iter().find(|earlier| earlier.name == name)
-        {
-            inner.expression.names(&mut used);
-        }
-    }
-    None
+        Ok::<(), Infallible>(())
+    });
+    let recursive = model.formulas.iter().zip(is_recursive).filter(|(_, is_recursive)| *is_recursive);
+    let diagnostic = |formula: &Named| {
+        let text = format!("the definition of `{name}` contains `{name}` itself", name = formula.name);
+        Diagnostic::new("Q204", formula.place, text)
+    };
+    recursive.map(|(formula, _)| diagnostic(formula)).collect()
 }
 
 fn parts(condition: &Expr) -> Vec<&Expr> {

@@ -258,3 +258,19 @@ fn a_hidden_parameter_keeps_its_value_in_a_constraint() {
         assert_eq!((solution.status, solution.plan.map(|plan| plan.steps.len())), (Status::Optimal, Some(1)));
     }
 }
+
+/// Without a value, `total-cost` is 0, so the plan holds the condition at one time only.
+#[test]
+fn a_duration_of_total_cost_without_a_value_is_not_positive() {
+    let domain = "(define (domain d) (:requirements :typing) (:predicates (p) (g)) (:functions (total-cost))
+      (:durative-action a :parameters () :duration (= ?duration (total-cost))
+        :condition (at start (p)) :effect (and (at start (not (p))) (at end (p)) (at end (g)))))";
+    let problem = "(define (problem p) (:domain d) (:init (p)) (:goal (g)) (:constraints (always (p))))";
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let plan = PlanText::parse(&Source::new("plan", "0: (a) [0]")).expect("a plan");
+    let verdict = validate(&domain, &problem, &plan, &Options::default());
+    assert!(verdict.valid, "{verdict:?}");
+    let errors = ground(&domain, &problem, &GroundConfig::default()).expect_err("the times may be equal");
+    assert!(errors.iter().all(|error| error.to_string().contains("which may be one time")), "{errors:?}");
+}

@@ -459,16 +459,8 @@ fn takes_time(domain: &Domain, problem: &Problem, action: &Action) -> bool {
                 let changes = |action: &Action| {
                     TIMES.iter().any(|time| Happening::of(action, *time).changes_function(name))
                 };
-                let is_positive = |element: &InitialElement| match element {
-                    InitialElement::Value(atom, value, _) => {
-                        atom.predicate.name != *name || value.is_positive()
-                    }
-                    _ => true,
-                };
-                let is_value = |element: &InitialElement| matches!(element, InitialElement::Value(atom, ..) if atom.predicate.name == *name);
-                // Without a value, `total-cost` is 0.
-                let has_value = *name != Name::new("total-cost") || problem.init.iter().any(is_value);
-                has_value && !domain.actions.iter().any(changes) && problem.init.iter().all(is_positive)
+                let values = problem.initial_values(name);
+                !domain.actions.iter().any(changes) && values.iter().all(Signed::is_positive)
             }
             _ => false,
         }

@@ -299,13 +299,7 @@ fn is_positive(task: (&Problem, &Lifted), expression: &Expression) -> bool {
         Expression::Number(number) => number.is_positive(),
         Expression::Function(function, ..) => {
             let function = &lifted.functions[function.index()];
-            let mut values = problem.init.iter().filter_map(|element| match element {
-                ast::InitialElement::Value(atom, value, _) => {
-                    (atom.predicate.name == function.name).then_some(value)
-                }
-                _ => None,
-            });
-            !function.fluent && values.all(Signed::is_positive)
+            !function.fluent && problem.initial_values(&function.name).iter().all(Signed::is_positive)
         }
         Expression::Sum(parts) | Expression::Product(parts, _) => all(parts),
         Expression::Quotient(left, right, _) => is_positive(task, left) && is_positive(task, right),
