@@ -20,6 +20,18 @@ pub(super) struct Interval {
     pub(super) high: Option<BigRational>,
 }
 
+/// Returns `sum + number * factor`. Integers are added without the common divisors that fractions need, because
+/// most numbers of a task are integers and divisors take most of the time.
+fn sum_with_product(sum: BigRational, number: &BigRational, factor: &BigRational) -> BigRational {
+    if number.is_zero() {
+        sum
+    } else if [&sum, number, factor].into_iter().all(BigRational::is_integer) {
+        BigRational::from_integer(sum.numer() + number.numer() * factor.numer())
+    } else {
+        sum + number * factor
+    }
+}
+
 impl Interval {
     pub(super) fn point(value: &BigRational) -> Self {
         Self { low: Some(value.clone()), high: Some(value.clone()) }
@@ -46,9 +58,10 @@ impl Linear {
     }
 
     pub(super) fn plus(mut self, other: &Self, factor: &BigRational) -> Self {
-        self.constant += &other.constant * factor;
-        for (key, own) in &other.factors {
-            let sum = self.factors.remove(key).unwrap_or_else(BigRational::zero) + own * factor;
+        self.constant = sum_with_product(self.constant, &other.constant, factor);
+        for (key, other_factor) in &other.factors {
+            let previous = self.factors.remove(key).unwrap_or_else(BigRational::zero);
+            let sum = sum_with_product(previous, other_factor, factor);
             if !sum.is_zero() {
                 self.factors.insert(key.clone(), sum);
             }
