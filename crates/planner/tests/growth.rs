@@ -2,7 +2,7 @@
 //! false claim may result.
 
 use std::fmt::Write as _;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use metaplan_planner::{
     Config, Exact, GroundConfig, Limits, Solution, Status, Task, ground, ground_concurrent, lexicographic,
@@ -28,6 +28,23 @@ fn task(domain: &str, problem: &str) -> Task {
 fn solve(task: &Task) -> Solution {
     let limits = Limits::none().with_time(Duration::from_secs(60));
     optimize(task, &Config::default().with_limits(limits), &mut |_| {})
+}
+
+/// The cheap plan would need numbers beyond every formula, so the formulas cannot decide whether it exists.
+#[test]
+fn a_formula_that_cannot_be_built_is_not_tried_for_ever() {
+    let domain = "(define (domain d) (:requirements :numeric-fluents) (:predicates (g)) (:functions (x) (y) (total-cost))
+      (:action double :parameters () :precondition ()
+        :effect (and (scale-up (x) 2) (scale-up (y) 2) (increase (total-cost) 1)))
+      (:action cheap :parameters () :precondition (= (x) (y)) :effect (and (g) (increase (total-cost) 1)))
+      (:action go :parameters () :precondition () :effect (and (g) (increase (total-cost) 1000))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (x) 1) (= (y) 3) (= (total-cost) 0)) (:goal (g))
+      (:metric minimize (total-cost)))";
+    let started = Instant::now();
+    let solution = solve(&task(domain, problem));
+    assert!(started.elapsed() < Duration::from_secs(50), "it ended at the limit only");
+    let cost = solution.plan.map(|plan| plan.cost.to_string());
+    assert_eq!((solution.status, cost.as_deref()), (Status::Feasible, Some("1000")));
 }
 
 fn large(times: usize) -> BigRational {

@@ -19,7 +19,7 @@ use task::error::Errors;
 use task::ground::{Generality, GroundConfig, ground_for};
 use task::limits::Interrupted;
 use task::number::{Int, Rational, dense};
-use task::plan::ground::GroundPlan;
+use task::plan::ground::{GroundPlan, cost};
 use task::plan::solution::{MetricUnbounded, Proof, Solution, Statistics, Status};
 use task::plan::{Plan, decode, metric};
 use task::task::quantity::{Linear, NumericId, Quantity};
@@ -92,8 +92,10 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
             let solution = answer(Status::Optimal, Some(show(&plan)), Some(Proof::Search));
             Solution { lower_bound: lower, horizon: plan.steps.len(), ..solution }
         }
-        (ExactOutcome::Optimal(plan), Some(horizon)) => within(context, horizon, &plan.cost),
-        (ExactOutcome::Unknown(_, lower), Some(horizon)) => within(context, horizon, &lower),
+        (ExactOutcome::Optimal(plan), Some(horizon)) => within(context, horizon, None, &plan.cost),
+        (ExactOutcome::Unknown(plan, lower), Some(horizon)) => {
+            within(context, horizon, plan.filter(|plan| !too_long(plan)), &lower)
+        }
         (ExactOutcome::Optimal(plan), None) => answer(Status::Feasible, Some(show(&plan)), None),
         (ExactOutcome::Unknown(plan, lower), None) => {
             let status = if plan.is_some() { Status::Feasible } else { Status::Unknown };
@@ -103,15 +105,22 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// Finds a best plan with at most `horizon` steps, or the best plan known at a limit. `lower` is a lower bound on
-/// the cost of all plans.
-fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
+/// Finds a best plan with at most `horizon` steps, or the best plan known at a limit: `incumbent`, which has at most
+/// `horizon` steps, or a cheaper one. `lower` is a lower bound on the cost of all plans.
+fn within(
+    context: Context<'_, Rational>,
+    horizon: usize,
+    incumbent: Option<GroundPlan<Rational>>,
+    lower: &Rational,
+) -> Solution {
     let shorter = with_horizon(context.task, horizon);
     let (status, plan, proof, horizon) = match explore(Context { task: &shorter, ..context }) {
         ExactOutcome::Optimal(plan) => (Status::Feasible, Some(plan), None, horizon),
-        ExactOutcome::Unknown(Some(plan), _) => (Status::Feasible, Some(plan), None, 0),
         ExactOutcome::Known(solution) => (Status::UnsolvableWithinHorizon, None, solution.proof, horizon),
-        ExactOutcome::Unknown(None, _) => (Status::Unknown, None, None, 0),
+        ExactOutcome::Unknown(plan, _) => {
+            let best = plan.into_iter().chain(incumbent).min_by(|a, b| a.cost.cmp(&b.cost));
+            (if best.is_some() { Status::Feasible } else { Status::Unknown }, best, None, 0)
+        }
     };
     let show = |plan: &GroundPlan<Rational>| decode(context, plan);
     let solution = answer(status, plan.as_ref().map(show), proof);
@@ -123,11 +132,12 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     let unknown = || nothing(answer(Status::Unknown, None, None));
     let context = Context::new(task, &config.limits);
     let by_steps = with_costs(task.clone(), |_| Quantity::constant(Rational::one()));
-    let steps = match explore(Context { task: &by_steps, ..context }) {
-        ExactOutcome::Optimal(plan) => plan.steps.len(),
+    let shortest = match explore(Context { task: &by_steps, ..context }) {
+        ExactOutcome::Optimal(plan) => plan,
         ExactOutcome::Known(solution) => return nothing(*solution),
         ExactOutcome::Unknown(..) => return unknown(),
     };
+    let steps = shortest.steps.len();
     if config.horizon.is_some_and(|horizon| steps > horizon) {
         let solution = answer(Status::UnsolvableWithinHorizon, None, Some(Proof::Search));
         return Solution { horizon: config.horizon.unwrap_or(steps), ..nothing(solution) };
@@ -143,10 +153,10 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     let (plan, proof) = match explore(Context { task: &shifted, ..context }) {
         ExactOutcome::Optimal(plan) => (plan, Some(Proof::Search)),
         ExactOutcome::Unknown(Some(plan), _) => (plan, None),
-        ExactOutcome::Known(_) | ExactOutcome::Unknown(None, _) => return unknown(),
+        ExactOutcome::Known(_) | ExactOutcome::Unknown(None, _) => (shortest, None),
     };
-    let shift = least * &Rational::from_big(BigRational::from_integer(steps.into()));
-    let plan = GroundPlan { cost: plan.cost + &shift, ..plan };
+    let Some(by_metric) = cost(task, &plan.steps) else { return unknown() };
+    let plan = GroundPlan { cost: by_metric, ..plan };
     let proved = can_repeat_reward(context, &plan.steps);
     Solution {
         horizon: steps,

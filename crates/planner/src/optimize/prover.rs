@@ -91,7 +91,10 @@ impl Prover {
                     self.horizon = horizon;
                     return ProverOutcome::Over;
                 }
-                (StrategyOutcome::Interrupted, _) if run.config.limits.reached() => {
+                // Without a budget, a formula that cannot be decided now cannot be decided later.
+                (StrategyOutcome::Interrupted, _)
+                    if run.config.limits.reached() || allowance.conflicts == u64::MAX =>
+                {
                     return ProverOutcome::Over;
                 }
                 (StrategyOutcome::Interrupted, _) => return ProverOutcome::Paused,

@@ -5,14 +5,13 @@ use task::context::Context;
 use task::limits::Interrupted;
 use task::number::Int;
 use task::plan::decode;
-use task::plan::ground::{GroundStep, cost, pass};
+use task::plan::ground::{GroundPlan, GroundStep, cost, pass};
 use task::plan::solution::{Improvement, MetricUnbounded, Proof, Solution, Status};
 use task::task::number::TaskNumber;
 use task::task::quantity::Quantity;
 use task::task::{Objective, Operator, Task};
 
 use crate::optimize::config::Config;
-use crate::optimize::horizon_schedule::first_plan;
 use crate::optimize::optimizer_run::{Best, Run, StrategyOutcome};
 use crate::optimize::prover::within;
 use crate::optimize::sat_budget::SatBudget;
@@ -27,12 +26,13 @@ pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
     let mut silent = |_: Improvement| {};
     let shortest = solve(Run::new(&by_steps, original.config, &mut silent));
     // Waits count as steps, although they are not part of decoded plans.
-    let steps = match (&shortest.ground, shortest.status) {
-        (Some(plan), Status::Optimal) => plan.steps.len(),
+    let plan = match (&shortest.ground, shortest.status) {
+        (Some(plan), Status::Optimal) => plan.clone(),
         // The plan need not have the fewest steps, and its metric was not minimised, so it is not returned.
         (Some(_), _) => return unknown(shortest),
         (None, _) => return Solution { lower_bound: None, ..shortest },
     };
+    let steps = plan.steps.len();
     // Subtracting `lowest` from every cost makes the costs non-negative. This does not change the order of
     // the plans, because all plans within this horizon have the same number of steps.
     let shifted = with_costs(original.task, |operator| {
@@ -46,21 +46,9 @@ pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
     let mut run = Run::new(&shifted, &config, &mut silent);
     run.statistics = original.statistics;
     run.statistics.unchecked.clone_from(&shortest.statistics.unchecked);
-    let Ok(bounds) = Bounds::new(run.context()) else {
-        return unknown(shortest);
-    };
-    let plan = match first_plan(&mut run, &bounds) {
-        Ok(plan) => plan,
-        Err(solution) => return *solution,
-    };
-    let mut best = Best { plan, lower: 0 };
-    let outcome = match run.extent(&bounds, best.plan.below(), &best) {
-        Ok(mut extent) => {
-            extent.allowed.truncate(steps);
-            within(&mut run, &bounds, &extent, &mut best, SatBudget::UNLIMITED)
-        }
-        Err(Interrupted) => StrategyOutcome::Interrupted,
-    };
+    let Some(shifted_cost) = cost(&shifted, &plan.steps) else { return unknown(shortest) };
+    let mut best = Best { plan: GroundPlan { cost: shifted_cost, ..plan }, lower: 0 };
+    let outcome = minimise_within(&mut run, steps, &mut best).unwrap_or(StrategyOutcome::Interrupted);
     let is_proved = matches!(outcome, StrategyOutcome::Exhausted) && run.statistics.unchecked.is_none();
     let proof = is_proved.then_some(Proof::Sat { step_bound: steps });
     let mut plan = best.plan;
@@ -82,6 +70,14 @@ pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
         unbounded: Some(unbounded),
         statistics,
     }
+}
+
+/// Minimises the metric of the plans with at most `steps` steps, beginning with the plan in `best`.
+fn minimise_within(run: &mut Run<'_>, steps: usize, best: &mut Best) -> Result<StrategyOutcome, Interrupted> {
+    let bounds = Bounds::new(run.context())?;
+    let mut extent = run.extent(&bounds, best.plan.below(), best)?;
+    extent.allowed.truncate(steps);
+    Ok(within(run, &bounds, &extent, best, SatBudget::UNLIMITED))
 }
 
 fn unknown(by_steps: Solution) -> Solution {
