@@ -7,6 +7,7 @@ use testing::adl::Generator;
 use testing::random::Random;
 
 use crate::tally::limits;
+use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 
 /// Engines, each with the number of states that A\* stores before satisficing search and SAT solver
@@ -187,6 +188,33 @@ fn a_duration_that_the_start_changes_is_refused() {
         errors.iter().any(|error| error.to_string().contains("a function of the duration")),
         "{errors:?}"
     );
+}
+
+/// With duration 0, the condition over all is void, so the action is executable. Its longest duration is not.
+#[test]
+fn a_longest_duration_is_refused_if_zero_is_admissible() {
+    let domain = |bounds: &str| {
+        format!(
+            "(define (domain d) (:requirements :durative-actions :duration-inequalities) (:predicates (q) (g))
+              (:durative-action go :parameters () :duration {bounds}
+                :condition (over all (q)) :effect (at end (g))))"
+        )
+    };
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (g)) (:metric maximize (total-time)))";
+    let read_both = |bounds: &str| {
+        read(&Source::new("domain", domain(bounds)), &Source::new("problem", problem)).expect("PDDL")
+    };
+    for bounds in ["(<= ?duration 5)", "(and (>= ?duration 0) (<= ?duration 5))"] {
+        let (domain, problem, _) = read_both(bounds);
+        let plan = PlanText::parse(&Source::new("plan", "0: (go) [0]")).expect("a plan");
+        assert!(validate(&domain, &problem, &plan, &Options::default()).valid, "{bounds}");
+        let errors = ground(&domain, &problem, &GroundConfig::default()).expect_err("a refusal");
+        assert!(errors.iter().all(|error| error.to_string().contains("may be 0")), "{errors:?}");
+    }
+    for bounds in ["(and (> ?duration 0) (<= ?duration 5))", "(and (>= ?duration 1) (<= ?duration 5))"] {
+        let (domain, problem, _) = read_both(bounds);
+        assert!(ground(&domain, &problem, &GroundConfig::default()).is_ok(), "{bounds}");
+    }
 }
 
 #[test]

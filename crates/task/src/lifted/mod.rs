@@ -5,6 +5,6 @@ mod task;
 
 pub use crate::number::Rational;
 pub use task::{
-    Arguments, Axiom, Bound, Change, Effect, Event, Expression, Formula, Function, FunctionId, Joint, Lifted,
-    Metric, ObjectId, Parameter, Predicate, PredicateId, Schema, Term, Time,
+    Arguments, Axiom, Bound, Change, DurationChoice, Effect, Event, Expression, Formula, Function,
+    FunctionId, Joint, Lifted, Metric, ObjectId, Parameter, Predicate, PredicateId, Schema, Term, Time,
 };

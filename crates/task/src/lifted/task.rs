@@ -109,8 +109,8 @@ pub struct Schema {
     pub end_effects: Vec<Effect>,
     /// Duration in the domain's time unit; `None` for an instantaneous action.
     pub duration: Option<Expression>,
-    /// `true` if the duration is variable in the domain and the planner chose the shortest admissible one.
-    pub is_chosen: bool,
+    /// Which admissible duration `duration` is, if several are admissible.
+    pub choice: DurationChoice,
     /// Set if start and end are simultaneous, because the duration is 0. `end_effects` then contains both
     /// sets of effects.
     pub joint: Option<Box<Joint>>,
@@ -118,6 +118,18 @@ pub struct Schema {
     /// happenings, the index of this schema.
     pub action: u32,
     pub place: Place,
+}
+
+/// The choice among the admissible durations of an action.
+#[derive(Debug, Clone, Default)]
+pub enum DurationChoice {
+    /// Only one duration is admissible, or the duration is an auxiliary function.
+    #[default]
+    None,
+    /// The shortest one.
+    Shortest,
+    /// The longest one. The lower bounds decide whether 0 is admissible, too.
+    Longest(Vec<(Comparison, Expression)>),
 }
 
 /// Separate conditions of the start and end of an action with duration 0, and the split of their effects.

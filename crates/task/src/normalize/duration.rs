@@ -6,7 +6,9 @@
 //! chooses a duration when the action starts.
 
 use crate::error::{Error, File, Place};
-use crate::lifted::{Expression, Formula, Function, FunctionId, Lifted, Metric, Rational, Term};
+use crate::lifted::{
+    DurationChoice, Expression, Formula, Function, FunctionId, Lifted, Metric, Rational, Term,
+};
 use crate::normalize::condition::expression;
 use crate::normalize::names::{Duration, Names, Scope};
 use crate::number::dense;
@@ -77,7 +79,7 @@ pub(super) fn duration(
     action: (&Name, usize),
     longest: Option<bool>,
     scope: &mut Scope,
-) -> (Expression, Vec<Formula>) {
+) -> (Expression, Vec<Formula>, DurationChoice) {
     let mut bounds = [Vec::new(), Vec::new()];
     let mut fixed = Vec::new();
     for constraint in constraints {
@@ -92,7 +94,7 @@ pub(super) fn duration(
         && bounds.iter().all(Vec::is_empty)
     {
         scope.duration = Duration::Fixed(duration.clone());
-        return (duration.clone(), Vec::new());
+        return (duration.clone(), Vec::new(), DurationChoice::None);
     }
     let [lower, upper] = bounds;
     let span = constraints.first().map_or(span, |constraint| constraint.span);
@@ -106,7 +108,7 @@ pub(super) fn duration(
             |(operator, bound, span)| Formula::Compare(operator, number.clone(), bound, scope.place(span));
         let conditions = constraints_on_duration.map(compare).collect();
         scope.duration = Duration::Fixed(number.clone());
-        return (number, conditions);
+        return (number, conditions, DurationChoice::None);
     }
     scope.duration = Duration::Open;
     let selected = match longest {
@@ -128,14 +130,21 @@ pub(super) fn duration(
             File::Domain,
             span,
         );
-        return (Expression::Number(Rational::from_integer(0)), Vec::new());
+        return (Expression::Number(Rational::from_integer(0)), Vec::new(), DurationChoice::None);
+    };
+    let choice = if longest == Some(true) {
+        DurationChoice::Longest(
+            lower.iter().map(|(bound, constraint)| (constraint.operator, bound.clone())).collect(),
+        )
+    } else {
+        DurationChoice::Shortest
     };
     let conditions = lower.into_iter().chain(upper).map(|(bound, constraint)| {
         let place = scope.place(constraint.span);
         Formula::Compare(constraint.operator, chosen.clone(), bound, place)
     });
     let conditions = conditions.collect();
-    (chosen, conditions)
+    (chosen, conditions, choice)
 }
 
 /// Returns an error for each duration constraint `at end` over a function that actions change, because the planner

@@ -14,8 +14,8 @@ pub mod undefined_fluents;
 pub mod zero_duration;
 
 use crate::error::{Errors, File, Place};
-use crate::lifted::{Axiom, Formula, Lifted, Metric, Schema};
-use names::{Duration, Names, Scope};
+use crate::lifted::{Axiom, DurationChoice, Formula, Lifted, Metric, Schema};
+use names::{Names, Scope};
 use pddl::ast::{self, ConditionTime, EffectTime};
 
 /// Normalises a domain and a problem for sequential execution. The `objectives`, in lexicographic order,
@@ -114,7 +114,7 @@ fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index:
         at_end: Formula::truth(),
         end_effects: Vec::new(),
         duration: None,
-        is_chosen: false,
+        choice: DurationChoice::None,
         joint: None,
         action: index,
         place: scope.place(action.span),
@@ -128,10 +128,9 @@ fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index:
             let mut middle = Vec::new();
             let (mut over_all, mut at_end) = (Vec::new(), Vec::new());
             let signature = (&action.identifier.name, schema.parameters.len());
-            let (chosen, mut start) =
+            let (chosen, mut start, choice) =
                 duration::duration(names, (duration, action.span), signature, longest, &mut scope);
-            schema.duration = Some(chosen);
-            schema.is_chosen = matches!(scope.duration, Duration::Open) && longest == Some(false);
+            (schema.duration, schema.choice) = (Some(chosen), choice);
             for (time, condition) in conditions {
                 let formula = condition::condition(names, condition, true, &mut scope);
                 match time {

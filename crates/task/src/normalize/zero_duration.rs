@@ -7,7 +7,7 @@ use num_traits::Zero;
 use rustc_hash::FxHashMap;
 
 use crate::error::{Error, Errors};
-use crate::lifted::{Expression, Formula, FunctionId, Joint, Lifted, Rational, Schema};
+use crate::lifted::{DurationChoice, Expression, Formula, FunctionId, Joint, Lifted, Rational, Schema};
 use pddl::ast::Comparison;
 
 type Range = Option<(Rational, Rational)>;
@@ -16,9 +16,8 @@ type Range = Option<(Rational, Rational)>;
 /// whose duration is always 0 is converted instead.
 ///
 /// # Errors
-/// Returns an error for each schema with a variable duration for which the planner takes the shortest admissible value,
-/// if this value may be 0 or less. Such a schema is refused because the conditions for duration 0 differ from those for
-/// slightly longer durations.
+/// Returns an error for each schema with a variable duration if 0 may be admissible. Such a schema is refused because the
+/// conditions for duration 0 differ from those for longer durations.
 pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     let mut ranges: FxHashMap<FunctionId, (Rational, Rational)> = FxHashMap::default();
     for (function, _, value) in &lifted.values {
@@ -33,13 +32,23 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     let (mut instants, mut errors) = (Vec::new(), Vec::new());
     for schema in &mut lifted.schemas {
         let Some(duration) = schema.duration.clone() else { continue };
+        let is_above_zero = |(operator, bound): &(Comparison, Expression)| {
+            range(bound, &range_of_function).is_some_and(|(low, _)| {
+                low.is_positive() || *operator == Comparison::Greater && low.is_zero()
+            })
+        };
+        let admits_zero = match &schema.choice {
+            DurationChoice::None => false,
+            DurationChoice::Shortest => !is_above_zero(&(Comparison::GreaterOrEqual, duration.clone())),
+            DurationChoice::Longest(lower) => !lower.iter().any(is_above_zero),
+        };
         match range(&duration, &range_of_function) {
-            Some((low, _)) if low.is_positive() => {}
-            _ if schema.is_chosen => errors.push(Error::Unsupported {
+            _ if admits_zero => errors.push(Error::Unsupported {
                 construct: format!("a duration of `{}` that is chosen, and may be 0", schema.name),
-                instead: "a lower bound above 0".into(),
+                instead: "a lower bound above 0, or `--concurrent`".into(),
                 place: schema.place,
             }),
+            Some((low, _)) if low.is_positive() => {}
             Some((low, high)) if low.is_zero() && high.is_zero() => *schema = instant(schema),
             Some((_, high)) if high.is_negative() => {}
             _ => {

@@ -62,7 +62,7 @@ use task::compile::{CompiledTask, PlanSemantics, compile as compile_away, is_hid
 use task::context::Context;
 use task::error::{Error, Errors, File, Place};
 use task::ground::{Generality, GroundConfig, ground_lifted};
-use task::lifted::{Expression, Lifted, Metric, Rational, Schema};
+use task::lifted::{DurationChoice, Expression, Lifted, Metric, Rational, Schema};
 use task::limits::Limits;
 use task::normalize::{normalize, normalize_freely, undefined_fluents};
 use task::number::Int;
@@ -283,7 +283,8 @@ fn has_fixed_duration(action: &ast::Action) -> bool {
 fn has_all_durations((domain, problem): (&Domain, &Problem), lifted: &Lifted) -> bool {
     let has_positive_minimum = |schema: &Schema| {
         let duration = schema.duration.as_ref();
-        schema.is_chosen && duration.is_some_and(|duration| is_positive((problem, lifted), duration))
+        matches!(schema.choice, DurationChoice::Shortest)
+            && duration.is_some_and(|duration| is_positive((problem, lifted), duration))
     };
     lifted.schemas.iter().all(|schema| {
         let action = domain.actions.get(schema.action as usize);

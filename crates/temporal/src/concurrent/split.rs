@@ -12,8 +12,8 @@ use task::compile::is_hidden;
 use task::error::{File, Place};
 use task::lifted::configuration::{SlotParameter, conjuncts, design_parameters, is_static};
 use task::lifted::{
-    Bound, Change, Effect, Event, Expression, Formula, FunctionId, Lifted, ObjectId, Predicate, PredicateId,
-    Rational, Schema, Term,
+    Bound, Change, DurationChoice, Effect, Event, Expression, Formula, FunctionId, Lifted, ObjectId,
+    Predicate, PredicateId, Rational, Schema, Term,
 };
 use task::number::dense;
 
@@ -257,7 +257,7 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
         at_end: Formula::truth(),
         end_effects: effects,
         duration: None,
-        is_chosen: false,
+        choice: DurationChoice::None,
         joint: None,
         action: dense(lifted.schemas.len()),
         place: Place { file: File::Problem, span: Span::default() },
