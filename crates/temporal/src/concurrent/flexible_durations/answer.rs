@@ -26,19 +26,19 @@ pub(super) struct Answer {
 ///
 /// Minimises, in this order: metric, makespan, sum of durations, sum of the times of all happenings.
 /// A metric without a minimum is skipped. Durations that are no decimals are then rounded to decimals if [`rounded`]
-/// succeeds, even if that increases the metric slightly.
+/// succeeds before a limit, even if that increases the metric slightly.
 pub(super) fn answer(
     concurrent: &TemporalTask,
     course: &Course,
-    limits: &Limits,
+    search_limits: &Limits,
 ) -> Result<Option<Answer>, Interrupted> {
     let Some(goal) = course.goal(concurrent) else { return Ok(None) };
     let mut program = course.program.clone();
-    if !program.constrain(&goal, limits)? {
+    if !program.constrain(&goal, search_limits)? {
         return Ok(None);
     }
     // There is a plan, which is not lost if a limit is reached meanwhile.
-    let limits = &limits.extended();
+    let limits = &search_limits.extended();
     let value = course.value_of_plan(concurrent);
     let durations: Vec<Affine> =
         course.chosen(concurrent).map(|position| Affine::column(duration_of(position))).collect();
@@ -46,8 +46,13 @@ pub(super) fn answer(
     let least = exact.value(&value);
     let fixed = fix(&exact, &durations, limits)?;
     let is_decimal = durations.iter().all(|duration| is_decimal(concurrent, &exact.value(duration)));
-    let rounded =
-        if is_decimal { None } else { rounded(concurrent, &program, (&value, &durations), limits)? };
+    // Rounding solves several linear programs for each duration, so an interruption ends it.
+    let rounded = if is_decimal {
+        None
+    } else {
+        let limits = if search_limits.has_deadline() { limits } else { search_limits };
+        rounded(concurrent, &program, (&value, &durations), limits).unwrap_or(None)
+    };
     let times: Vec<Affine> = course.passed.iter().map(|passed| passed.time.clone()).collect();
     let program = best(&rounded.unwrap_or(fixed), &[&Affine::column(MAKESPAN), &sum(&times)], limits)?;
     let at = |expression: &Affine| program.value(expression);
