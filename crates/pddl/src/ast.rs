@@ -87,7 +87,7 @@ impl fmt::Display for Name {
 }
 
 /// A name with its position in the source.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Identifier {
     /// The name.
     pub name: Name,
@@ -104,14 +104,14 @@ impl From<Name> for Identifier {
 
 /// Type of a typed-list entry: one type name, or several for `either`. The type `object` is represented by an
 /// empty list, except within `either`.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct TypeExpression {
     /// Names of the alternative types.
     pub alternatives: Vec<Identifier>,
 }
 
 /// An entry of a typed list. Variables are stored without their question mark.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TypedName {
     /// Declared variable, object or type.
     pub identifier: Identifier,
@@ -302,7 +302,7 @@ pub enum EffectTime {
 }
 
 /// A variable or a constant.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Term {
     /// `?x`, stored as `x`.
     Variable(Identifier),
@@ -319,7 +319,7 @@ impl Term {
 }
 
 /// A predicate or a numeric function applied to terms.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Atom {
     /// Predicate or function.
     pub predicate: Identifier,
@@ -330,7 +330,7 @@ pub struct Atom {
 }
 
 /// Goal description (GD) in the grammar of PDDL.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Condition {
     /// `(and …)`; the empty conjunction is true.
     And(Vec<Condition>),
@@ -393,7 +393,7 @@ impl Comparison {
 }
 
 /// A numeric expression.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Expression {
     /// A number, with its exact value.
     Number(BigRational, Span),

@@ -78,15 +78,14 @@ fn move_constants(domain: &mut Domain, problem: &mut Problem) {
         }
         node => used.extend(function(node).iter().flat_map(|atom| &atom.arguments).filter_map(constant)),
     });
-    let (moved, kept) = std::mem::take(&mut problem.objects)
+    // A constant that the problem declares again has the types of both declarations.
+    used.extend(domain.constants.iter().map(|constant| constant.identifier.name.clone()));
+    let (moved, kept): (Vec<_>, Vec<_>) = std::mem::take(&mut problem.objects)
         .into_iter()
         .partition(|object| used.contains(&object.identifier.name));
     problem.objects = kept;
-    let declared: FxHashSet<Name> =
-        domain.constants.iter().map(|constant| constant.identifier.name.clone()).collect();
-    let is_new = |object: &TypedName| !declared.contains(&object.identifier.name);
-    domain.constants.extend(Vec::into_iter(moved).filter(is_new));
-    merge_types(&mut domain.constants);
+    domain.constants.extend(moved);
+    merge_types(&TypeHierarchy::of(domain), &mut domain.constants);
 }
 
 fn constant(term: &Term) -> Option<Name> {
@@ -96,13 +95,10 @@ fn constant(term: &Term) -> Option<Name> {
     }
 }
 
-/// Removes objects that are also constants, repeated facts and values, and negated facts, which the
-/// closed-world assumption implies. Merges repeated declarations of an object.
+/// Removes repeated facts and values, and negated facts, which the closed-world assumption implies. Merges
+/// repeated declarations of an object.
 fn remove_duplicates(domain: &Domain, problem: &mut Problem) {
-    let constants: FxHashSet<Name> =
-        domain.constants.iter().map(|constant| constant.identifier.name.clone()).collect();
-    problem.objects.retain(|object| !constants.contains(&object.identifier.name));
-    merge_types(&mut problem.objects);
+    merge_types(&TypeHierarchy::of(domain), &mut problem.objects);
     let mut stated: FxHashSet<(bool, Name, Vec<Name>)> = FxHashSet::default();
     problem.init.retain(|element| match element {
         InitialElement::Fact(atom) => stated.insert((false, atom.predicate.name.clone(), names(atom))),
@@ -112,8 +108,9 @@ fn remove_duplicates(domain: &Domain, problem: &mut Problem) {
     });
 }
 
-/// Merges repeated declarations of an object, which then has all their types.
-fn merge_types(objects: &mut Vec<TypedName>) {
+/// Merges repeated declarations of an object, which then has all their types. A supertype of another type of
+/// the object is not stated.
+fn merge_types(hierarchy: &TypeHierarchy, objects: &mut Vec<TypedName>) {
     let mut merged: Vec<TypedName> = Vec::with_capacity(objects.len());
     let mut places: FxHashMap<Name, usize> = FxHashMap::default();
     for object in objects.drain(..) {
@@ -127,6 +124,11 @@ fn merge_types(objects: &mut Vec<TypedName>) {
             |alternative: &Identifier| alternatives.iter().all(|present| present.name != alternative.name);
         let new_alternatives: Vec<_> = object.r#type.alternatives.into_iter().filter(is_new).collect();
         alternatives.extend(new_alternatives);
+        let all = alternatives.clone();
+        let is_below = |lower: &Identifier, upper: &Identifier| {
+            hierarchy.is_a(&lower.name, &upper.name) && !hierarchy.is_a(&upper.name, &lower.name)
+        };
+        alternatives.retain(|upper| !all.iter().any(|lower| is_below(lower, upper)));
     }
     *objects = merged;
 }

@@ -63,11 +63,17 @@ impl Problem {
     #[must_use]
     pub fn initial_values(&self, function: &Name) -> Vec<BigRational> {
         let value_of = |element: &InitialElement| match element {
-            InitialElement::Value(atom, value, _) => (atom.predicate.name == *function).then(|| value.clone()),
+            InitialElement::Value(atom, value, _) => {
+                (atom.predicate.name == *function).then(|| value.clone())
+            }
             _ => None,
         };
         let values: Vec<_> = self.init.iter().filter_map(value_of).collect();
-        if values.is_empty() && *function == Name::new("total-cost") { vec![BigRational::zero()] } else { values }
+        if values.is_empty() && *function == Name::new("total-cost") {
+            vec![BigRational::zero()]
+        } else {
+            values
+        }
     }
 }
 

@@ -187,3 +187,24 @@ fn lenient_syntax_is_read_as_by_other_planners() {
     let (_, problem) = metaplan_pddl::portable(&domain, &problem);
     assert!(metaplan_pddl::print_problem(&problem).contains("k - (either oven kiln)"));
 }
+
+/// Without the narrower type, `(go c)` would not be an action of the portable files.
+#[test]
+fn a_constant_that_is_declared_again_keeps_both_types() {
+    let domain = Source::new(
+        "domain",
+        "(define (domain d) (:requirements :typing) (:types truck - vehicle) (:constants c - vehicle)
+          (:predicates (done)) (:action go :parameters (?t - truck) :effect (done)))",
+    );
+    let problem = Source::new(
+        "problem",
+        "(define (problem p) (:domain d) (:objects c - truck) (:init) (:goal (done)))",
+    );
+    let (domain, problem, _) = read(&domain, &problem).expect("it is accepted");
+    let (domain, problem) = metaplan_pddl::portable(&domain, &problem);
+    let texts = [metaplan_pddl::print_domain(&domain), metaplan_pddl::print_problem(&problem)];
+    let (domain, problem, _) =
+        read(&Source::new("domain", &texts[0]), &Source::new("problem", &texts[1])).expect("portable files");
+    let plan = PlanText::parse(&Source::new("plan", "(go c)")).expect("it is a plan");
+    assert!(validate(&domain, &problem, &plan, &Options::default()).valid, "{texts:?}");
+}

@@ -3,7 +3,7 @@
 use num_rational::BigRational;
 use num_traits::Zero;
 
-use crate::ast::{Constraint, Name};
+use crate::ast::{Constraint, Name, Trajectory};
 
 use super::world::{State, World};
 
@@ -17,8 +17,10 @@ pub(super) struct Moment {
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct Record {
-    /// States of the trajectory, in order. Empty if the domain and the problem have no constraints.
+    /// States of the trajectory, in order. Only the last one if no constraint concerns another one; none if
+    /// the domain and the problem have no constraints.
     pub(super) moments: Vec<Moment>,
+    keeps_all: bool,
     /// Violated preferences of actions, once per violation.
     pub(super) violated: Vec<Name>,
 }
@@ -28,6 +30,8 @@ impl Record {
         let mut record = Self::default();
         if constraints(world).next().is_some() {
             record.moments.push(Moment { time: BigRational::zero(), state: state.clone(), is_event: false });
+            record.keeps_all =
+                !constraints(world).all(|constraint| concerns_last_state(&constraint.trajectory));
         }
         record
     }
@@ -37,10 +41,20 @@ impl Record {
     pub(super) fn note(&mut self, time: &BigRational, state: &State, is_event: bool) {
         // Without constraints nothing is recorded, to save memory.
         let Some(last) = self.moments.last() else { return };
-        if last.is_event && last.time == *time {
+        if !self.keeps_all || last.is_event && last.time == *time {
             self.moments.pop();
         }
         self.moments.push(Moment { time: time.clone(), state: state.clone(), is_event });
+    }
+}
+
+/// Returns `true` if a constraint concerns only the last state, such as a preference of the goal.
+fn concerns_last_state(trajectory: &Trajectory) -> bool {
+    match trajectory {
+        Trajectory::AtEnd(_) => true,
+        Trajectory::And(parts) => parts.iter().all(concerns_last_state),
+        Trajectory::ForAll(_, body) => concerns_last_state(body),
+        _ => false,
     }
 }
 
