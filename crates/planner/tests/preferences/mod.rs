@@ -259,13 +259,14 @@ fn a_hidden_parameter_keeps_its_value_in_a_constraint() {
     }
 }
 
-/// Without a value, `total-cost` is 0, so the plan holds the condition at one time only.
+/// Without a value, `total-cost` is 0, so start and end are one happening, after which `(q)` holds.
 #[test]
 fn a_duration_of_total_cost_without_a_value_is_not_positive() {
-    let domain = "(define (domain d) (:requirements :typing) (:predicates (p) (g)) (:functions (total-cost))
+    let domain = "(define (domain d) (:requirements :typing) (:predicates (p) (q)) (:functions (total-cost))
       (:durative-action a :parameters () :duration (= ?duration (total-cost))
-        :condition (at start (p)) :effect (and (at start (not (p))) (at end (p)) (at end (g)))))";
-    let problem = "(define (problem p) (:domain d) (:init (p)) (:goal (g)) (:constraints (always (p))))";
+        :condition (at start (p)) :effect (and (at start (not (p))) (at end (q)))))";
+    let problem =
+        "(define (problem p) (:domain d) (:init (p)) (:goal (q)) (:constraints (always (or (p) (q)))))";
     let (domain, problem, _) =
         read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
     let plan = PlanText::parse(&Source::new("plan", "0: (a) [0]")).expect("a plan");
@@ -273,4 +274,25 @@ fn a_duration_of_total_cost_without_a_value_is_not_positive() {
     assert!(verdict.valid, "{verdict:?}");
     let errors = ground(&domain, &problem, &GroundConfig::default()).expect_err("the times may be equal");
     assert!(errors.iter().all(|error| error.to_string().contains("which may be one time")), "{errors:?}");
+}
+
+/// Cells form a ring, and the constraint admits all but one of them, so the robot takes the longer way round. A move may
+/// change the constraint in more ways than are distinguished.
+#[test]
+fn a_constraint_on_many_cells_holds() {
+    let cells = 400;
+    let list = |item: &dyn Fn(u32) -> String| (0..cells).map(item).collect::<String>();
+    let domain = "(define (domain d) (:requirements :typing) (:types cell) (:predicates (at ?c - cell) (next ?a ?b - cell))
+      (:action move :parameters (?a ?b - cell) :precondition (and (at ?a) (or (next ?a ?b) (next ?b ?a)))
+        :effect (and (at ?b) (not (at ?a)))))";
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects {} - cell) (:init (at c0) {}) (:goal (at c4))
+          (:constraints (always (or {}))))",
+        list(&|cell| format!("c{cell} ")),
+        list(&|cell| format!("(next c{cell} c{}) ", (cell + 1) % cells)),
+        list(&|cell| if cell == 2 { String::new() } else { format!("(at c{cell}) ") }),
+    );
+    let solution = solve(domain, &problem, Engine::Auto, Duration::from_secs(60)).expect("few constraints");
+    let steps = solution.plan.map(|plan| plan.steps.len());
+    assert_eq!((solution.status, steps), (Status::Optimal, Some(cells as usize - 4)));
 }

@@ -101,7 +101,7 @@ impl Happening {
             let pairs = target.arguments.iter().zip(&atom.arguments).filter(|(_, own)| !is_inner(own));
             let matches = all(pairs.map(|(changed, own)| equal(changed, own)));
             let is_affected = exists(&change.bound, matches);
-            if !found.iter().any(|known| format!("{known:?}") == format!("{is_affected:?}")) {
+            if !found.contains(&is_affected) {
                 found.push(is_affected);
             }
         }

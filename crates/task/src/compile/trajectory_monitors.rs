@@ -47,6 +47,9 @@ pub(super) struct Addition {
     effects: Vec<Effect>,
 }
 
+/// Maximum number of ways in which an action may change a condition, up to which the condition is simplified for each way.
+const MAX_WAYS: usize = 32;
+
 const TIMES: [EffectTime; 2] = [EffectTime::AtStart, EffectTime::AtEnd];
 
 impl<'t> Monitors<'t> {
@@ -204,7 +207,12 @@ impl<'t> Monitors<'t> {
                         place,
                     )
                 })?;
-                for way in ways(touched) {
+                let mut ways = ways(touched);
+                // Each way has its own copy of the conditions, so many ways are not distinguished.
+                if ways.len() > MAX_WAYS {
+                    ways = vec![any(ways)];
+                }
+                for way in ways {
                     let after: Vec<_> = after.iter().map(|condition| assume(condition, &way)).collect();
                     let addition_of_way = make(way, &after);
                     addition
