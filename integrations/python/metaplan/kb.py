@@ -28,21 +28,25 @@ class Knowledge:
     """
 
     def __init__(self, graph: rdflib.Graph, path: str | os.PathLike[str] | None = None) -> None:
+        text = graph.serialize(format="nt", encoding="utf-8")
+        self._open(path)
+        # Sorted lines, so that equal graphs give equal documents.
+        self.path.write_bytes(b"".join(sorted(text.splitlines(keepends=True))))
+
+    def _open(self, path: str | os.PathLike[str] | None) -> None:
+        """Sets the path; without ``path``, that of a new temporary document."""
         self._temporary = None
         if path is None:
             self._temporary = tempfile.TemporaryDirectory(prefix="metaplan-kb-")
             path = Path(self._temporary.name) / "knowledge.nt"
         self.path = Path(path)
         """Path of the document, in N-Triples."""
-        text = graph.serialize(format="nt", encoding="utf-8")
-        # Sorted lines, so that equal graphs give equal documents.
-        self.path.write_bytes(b"".join(sorted(text.splitlines(keepends=True))))
 
     def __fspath__(self) -> str:
         return os.fspath(self.path)
 
-    def __reduce__(self) -> tuple[Callable[..., Knowledge], tuple[str, str | None]]:
-        return _restored, (self.path.read_text(encoding="utf-8"), None if self._temporary else os.fspath(self.path))
+    def __reduce__(self) -> tuple[Callable[..., Knowledge], tuple[bytes, str | None]]:
+        return _restored, (self.path.read_bytes(), None if self._temporary else os.fspath(self.path))
 
     def reason(self, **options: Any) -> Answer:
         """Queries the knowledge base; ``options`` are those of :func:`metaplan.reason`."""
@@ -75,9 +79,13 @@ def load(source: Any, path: str | os.PathLike[str] | None = None) -> Knowledge:
     return Knowledge(_graph(source), path)
 
 
-def _restored(document: str, path: str | None) -> Knowledge:
-    """Recreates a knowledge base that was pickled."""
-    return Knowledge(rdflib.Graph().parse(data=document, format="nt"), path)
+def _restored(document: bytes, path: str | None) -> Knowledge:
+    """Recreates a knowledge base that was pickled. A file that is still there may have been changed since, so it is not overwritten."""
+    knowledge = Knowledge.__new__(Knowledge)
+    knowledge._open(path)
+    if not knowledge.path.exists():
+        knowledge.path.write_bytes(document)
+    return knowledge
 
 
 def _graph(source: Any) -> rdflib.Graph:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from fractions import Fraction
 from types import FunctionType
 from typing import IO, Any
@@ -109,6 +110,12 @@ def _kind(features: dict[str, tuple[str, ...]]) -> ProblemKind:
         for name in names:
             getattr(kind, f"set_{group}")(name)
     return kind
+
+
+def _is_better(result: PlanGenerationResult, other: PlanGenerationResult, maximizes: bool) -> bool:
+    """Compares the costs of two plans."""
+    cost, other_cost = (Fraction(each.metrics["cost"]) for each in (result, other))
+    return cost > other_cost if maximizes else cost < other_cost
 
 
 def _is_timed(kind: ProblemKind) -> bool:
@@ -313,27 +320,30 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
         self, problem: up.model.AbstractProblem, timeout: float | None = None, output_stream: IO[str] | None = None
     ) -> Iterator[PlanGenerationResult]:
         began, share = time.monotonic(), 0.1
-        best: Fraction | None = None
+        best: PlanGenerationResult | None = None
         maximizes = any(metric.is_maximize_expression_on_final_state() for metric in problem.quality_metrics)
         while True:
-            left = None if timeout is None else timeout - (time.monotonic() - began)
+            round_began = time.monotonic()
+            left = None if timeout is None else max(timeout - (round_began - began), 0.0)
             is_last = left is not None and left <= share
-            result = self._answer(problem, left if is_last else share, output_stream)
+            limit = left if is_last else share
+            result = self._answer(problem, limit, output_stream)
             # Without a metric, all plans are equally good.
             is_best = result.plan is not None and not problem.quality_metrics
-            is_ended = is_best or result.status not in (
-                PlanGenerationResultStatus.SOLVED_SATISFICING,
-                PlanGenerationResultStatus.TIMEOUT,
-            )
+            is_unproved = result.status in (PlanGenerationResultStatus.SOLVED_SATISFICING, PlanGenerationResultStatus.TIMEOUT)
+            # A search that ends without a proof long before its time limit has reached another limit, such as that on memory.
+            is_ended = is_best or not is_unproved or time.monotonic() - round_began < limit / 2
+            is_better = result.plan is not None and (best is None or _is_better(result, best, maximizes))
             if is_ended or is_last:
+                if is_unproved and best is not None and not is_better:
+                    best.status = PlanGenerationResultStatus.SOLVED_SATISFICING
+                    result = best
                 yield result
                 return
-            if result.plan is not None:
-                cost = Fraction(result.metrics["cost"])
-                if best is None or (cost > best if maximizes else cost < best):
-                    best = cost
-                    result.status = PlanGenerationResultStatus.INTERMEDIATE
-                    yield result
+            if is_better:
+                best = result
+                # The status of the caller's result must not change when `best` becomes the final result.
+                yield replace(result, status=PlanGenerationResultStatus.INTERMEDIATE)
             share = min(2 * share, _MAX_SHARE)
 
     def _answer(self, problem: Any, timeout: float | None, output_stream: IO[str] | None) -> PlanGenerationResult:

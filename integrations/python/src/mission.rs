@@ -20,7 +20,7 @@ use metaplan::planner::{Planned as Found, Planner, consistent};
 use metaplan::report::{Positions, Seen};
 use metaplan::setup::Setup;
 use metaplan::{explain, report};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use serde::Serialize;
 
@@ -276,7 +276,11 @@ impl Mission {
         match (found, stopped) {
             (Ok(planned), None) => Ok(planned),
             // After Ctrl-C, the best known plan is returned. A Pareto front, which has no `text`, is not returned.
-            (Ok(planned), Some(_)) if planned.text.is_some() => Ok(planned),
+            (Ok(planned), Some(error))
+                if planned.text.is_some() && error.is_instance_of::<PyKeyboardInterrupt>(py) =>
+            {
+                Ok(planned)
+            }
             (_, Some(error)) | (Err(Stop::Raised(error)), None) => Err(error),
             (Err(Stop::Wrong(messages)), None) => Err(raise(py, &messages)),
         }

@@ -14,7 +14,7 @@ const STACK: usize = 8 << 20;
 
 /// Runs `work` on a thread while other threads of the interpreter continue. If a signal raises an
 /// exception such as `KeyboardInterrupt`, sets the interrupt flag and still waits for the result.
-/// Then the exception is returned together with the result, which may be partial.
+/// Then the exception, the last one if there are several, is returned together with the result, which may be partial.
 pub(crate) fn detached<T: Send>(
     py: Python<'_>,
     interrupt: &AtomicBool,
@@ -39,7 +39,7 @@ pub(crate) fn detached<T: Send>(
                         // in its lifetime.
                         #[expect(clippy::redundant_closure_for_method_calls, reason = "see above")]
                         let signal = Python::attach(|py| py.check_signals());
-                        if let (None, Err(error)) = (&stopped, signal) {
+                        if let Err(error) = signal {
                             interrupt.store(true, Ordering::Relaxed);
                             stopped = Some(error);
                         }

@@ -45,3 +45,18 @@ def test_an_owlready2_world_is_a_knowledge_base(tmp_path):
     design = rdflib.URIRef("http://metacontrol.org/metaplan/ugv#fd_amcl_kinect")
     facts = list(world.as_rdflib_graph().objects(design, rdflib.URIRef(TOMASYS + "fd_realisability")))
     assert [str(fact).lower() for fact in facts] == ["false"]
+
+
+def test_a_restored_knowledge_base_does_not_overwrite_its_file(tmp_path):
+    path = tmp_path / "kb.nt"
+    graph = rdflib.Graph().parse(data="<http://e/a> <http://e/p> _:b .", format="nt")
+    pickled = pickle.dumps(metaplan.kb.load(graph, path))
+    written = path.read_bytes()
+    assert pickle.loads(pickled).path == path
+    assert path.read_bytes() == written
+    path.write_text("<http://e/c> <http://e/p> <http://e/d> .\n")
+    pickle.loads(pickled)
+    assert path.read_text().startswith("<http://e/c>")
+    path.unlink()
+    pickle.loads(pickled)
+    assert path.read_bytes() == written

@@ -1,6 +1,7 @@
 """Metaplan's engines for unified-planning, on the test cases of unified-planning and on random problems."""
 
 import random
+import time
 import warnings
 from fractions import Fraction
 
@@ -339,7 +340,8 @@ def test_only_better_plans_are_intermediate(metric, yielded):
     problem.add_quality_metric(metric(problem.add_fluent("gain", up.shortcuts.RealType())()))
     costs = iter([5, 3, 7])
 
-    def answer(*_):
+    def answer(_, limit, __):
+        time.sleep(limit)
         cost = next(costs, None)
         if cost is None:
             return PlanGenerationResult(Status.UNSOLVABLE_PROVEN, None, engine_name="metaplan")
@@ -350,6 +352,33 @@ def test_only_better_plans_are_intermediate(metric, yielded):
     engine._answer = answer
     results = list(engine._get_solutions(problem))
     assert [int(result.metrics["cost"]) for result in results if result.status == Status.INTERMEDIATE] == yielded
+
+
+def test_the_best_plan_is_the_last_result_of_an_anytime_planner():
+    problem = EXAMPLES["basic"].problem.clone()
+    problem.add_quality_metric(MinimizeExpressionOnFinalState(problem.add_fluent("gain", up.shortcuts.RealType())()))
+    plan = EXAMPLES["basic"].valid_plans[0]
+    found = PlanGenerationResult(Status.SOLVED_SATISFICING, plan, engine_name="metaplan", metrics={"cost": "5"})
+    answers = iter([found, PlanGenerationResult(Status.TIMEOUT, None, engine_name="metaplan")])
+
+    def answer(_, limit, __):
+        # Overhead of a round is not part of its limit.
+        time.sleep(limit + 0.2)
+        return next(answers)
+
+    engine = metaplan.up.MetaplanEngine()
+    engine._answer = answer
+    results = list(engine._get_solutions(problem, timeout=0.4))
+    assert [result.status for result in results] == [Status.INTERMEDIATE, Status.SOLVED_SATISFICING]
+    assert all(result.plan == plan for result in results)
+
+
+def test_an_anytime_planner_ends_at_a_limit_that_is_not_on_time():
+    problem = EXAMPLES["basic"].problem.clone()
+    problem.add_quality_metric(MinimizeExpressionOnFinalState(problem.add_fluent("gain", up.shortcuts.RealType())()))
+    engine = metaplan.up.MetaplanEngine()
+    engine._answer = lambda *_: PlanGenerationResult(Status.TIMEOUT, None, engine_name="metaplan")
+    assert [result.status for result in engine._get_solutions(problem)] == [Status.TIMEOUT]
 
 
 def test_a_problem_without_a_metric_gets_a_certificate(tmp_path):
