@@ -73,15 +73,18 @@ pub fn perform(
         }
     }
     let ended = execute(program, &study.words(run, folder.path()))?;
-    let (status, timed_out) = match ended.status {
-        Ok(status) => (status.code(), false),
-        Err(Reached::TimeLimit) => (None, true),
+    let (status, timed_out, signal) = match ended.status {
+        Ok(status) => (status.code(), false, status.code().is_none().then(|| status.to_string())),
+        Err(Reached::TimeLimit) => (None, true, None),
         Err(Reached::Study) => return Ok(None),
     };
     let answer: Value = serde_json::from_str(&ended.output).unwrap_or_default();
     let (answer, message) = match error_texts(&answer) {
         Some(texts) => (Value::Null, texts),
-        None if answer.is_null() => (Value::Null, end_of(&ended.errors).to_owned()),
+        None if answer.is_null() => {
+            let message = format!("{}\n{}", signal.unwrap_or_default(), end_of(&ended.errors));
+            (Value::Null, message.trim().to_owned())
+        }
         None => (answer, String::new()),
     };
     Ok(Some(line(status, timed_out, answer, message)))
