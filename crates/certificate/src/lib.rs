@@ -58,7 +58,9 @@ pub mod format {
 }
 
 pub use check::{Checked, Claimed, Fault, GroundTask, check};
-pub use clausal::{Formula, Inputs, Literal, REFUTATION_PARTS, StepBounds, check_refutation, lines};
+pub use clausal::{
+    Formula, Inputs, LITERAL_LIMIT, Literal, REFUTATION_PARTS, StepBounds, check_refutation, lines,
+};
 pub use faithful::{Cause, Difference, Faithful, faithful, faithful_to, witness, witnessed};
 pub use smt::verification_conditions;
 pub use {num_rational::BigRational, pddl};

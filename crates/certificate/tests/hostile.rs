@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use metaplan_certificate::{
-    Cause, Claimed, Difference, Faithful, Fault, GroundTask, check, faithful, witness,
+    Cause, Claimed, Difference, Faithful, Fault, GroundTask, LITERAL_LIMIT, check, faithful, witness,
 };
 use num_rational::BigRational;
 use pddl::Source;
@@ -185,7 +185,7 @@ fn formulas_do_not_cover_derived_variables_without_rules() {
         let task = GroundTask::read(task).expect("a task");
         let claimed = Claimed::read(&task, argument, Some(&claim)).expect("an argument");
         let steps = claimed.step_bounds(&|| false).expect("a bound").spent.expect("a bound");
-        claimed.formula(steps, &|| false).err()
+        claimed.formula(steps, LITERAL_LIMIT, &|| false).err()
     };
     assert_eq!(reason(&task), None);
     let derived = task.replace(r#""basic": 3"#, r#""basic": 2"#);

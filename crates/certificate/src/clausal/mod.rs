@@ -32,7 +32,7 @@ pub use literal::Literal;
 pub use steps::StepBounds;
 
 /// Upper limit on the number of literals of a formula, and on the number of its variables.
-const LITERAL_LIMIT: usize = 4_000_000;
+pub const LITERAL_LIMIT: usize = 4_000_000;
 /// The input streams of a refutation.
 pub struct Inputs<'i> {
     /// The formula in the DIMACS format.
@@ -57,13 +57,13 @@ impl Claimed<'_> {
         steps::bounds(self.model, &self.argument, self.claimed_cost()?, stop)
     }
 
-    /// Encodes "some plan of at most `steps` steps is cheaper than the claim". `stop` returns `true` to cancel the
-    /// encoding.
+    /// Encodes "some plan of at most `steps` steps is cheaper than the claim", with at most `literals` literals. A
+    /// formula of more than [`LITERAL_LIMIT`] literals cannot be checked. `stop` returns `true` to cancel the encoding.
     ///
     /// # Errors
     /// A missing claim, an unsupported construct, an exceeded limit, or a cancelled encoding.
-    pub fn formula(&self, steps: usize, stop: &dyn Fn() -> bool) -> Result<Formula, String> {
-        encoding::encode(self.model, self.claimed_cost()?, steps, LITERAL_LIMIT, stop)
+    pub fn formula(&self, steps: usize, literals: usize, stop: &dyn Fn() -> bool) -> Result<Formula, String> {
+        encoding::encode(self.model, self.claimed_cost()?, steps, literals, stop)
     }
 
     fn claimed_cost(&self) -> Result<&Integer, String> {

@@ -14,6 +14,9 @@ use crate::certificate::trim;
 const SPENT_CONFLICT_LIMIT: u64 = 500;
 /// Maximum number of conflicts for the formula with the fewest steps.
 const CONFLICT_LIMIT: u64 = 2_000;
+/// Maximum number of literals of a formula that is written; the checker reads larger ones. The largest formula that is
+/// refuted within the conflict limits for a reference instance has 21,862 clauses.
+const WRITTEN_LITERALS: usize = 400_000;
 /// Number of bits up to which the full conflict limit applies. For wider numbers, the limit is inversely
 /// proportional to the width, because each conflict costs more.
 const REFERENCE_WIDTH: usize = 32;
@@ -72,7 +75,7 @@ pub fn refute(
     outputs: Outputs<'_>,
     limits: &Limits,
 ) -> Result<(), String> {
-    let formula = claimed.formula(attempt.steps, &|| limits.reached())?;
+    let formula = claimed.formula(attempt.steps, WRITTEN_LITERALS, &|| limits.reached())?;
     let io_error = |error: std::io::Error| format!("it cannot be written: {error}");
     let conflicts = attempt.conflicts * REFERENCE_WIDTH as u64 / formula.widest().max(REFERENCE_WIDTH) as u64;
     let numbers = formula.clauses().map(|clause| clause.iter().map(|literal| literal.number()));
