@@ -1,10 +1,10 @@
 //! The command `metaplan export`, which writes a mission in PDDL, PRISM or JANI for other tools.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::answers::{MissionExport, ModelExport};
 use crate::comparison::{Coadaptation, Risk, Roles, Tasked, program, published_program};
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use crate::mission::Mission;
 use crate::setup::Setup;
 use crate::visible::visible_json;
@@ -78,9 +78,17 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (domain, problem) = (print_domain(&domain), print_problem(&problem));
     match output::file_named(arguments.output.as_ref()) {
         Some(directory) => {
+            let files = [(directory.join("domain.pddl"), domain), (directory.join("problem.pddl"), problem)];
+            let is_source = |path: &Path| {
+                let sources = [mission.domain_source(), mission.problem_source()];
+                sources.iter().any(|source| is_same(Path::new(source.name()), path))
+            };
+            let sources = files.iter().map(|(path, _)| path).filter(|path| is_source(path));
+            Errors::unless_empty(sources.map(|path| output::exists(path)))?;
             output::make_directory(directory)?;
-            output::write_file(&directory.join("domain.pddl"), &domain)?;
-            output::write_file(&directory.join("problem.pddl"), &problem)?;
+            for (path, text) in &files {
+                output::write_file(path, text)?;
+            }
         }
         None if common.format == Format::Json => {
             output::json_answer(&MissionExport::new(domain, problem));
@@ -88,6 +96,11 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         None => output::document(&format!("{domain}\n{problem}")),
     }
     Ok(Exit::Done)
+}
+
+/// Returns `true` if both paths name the same existing file.
+fn is_same(first: &Path, second: &Path) -> bool {
+    first.canonicalize().is_ok_and(|first| second.canonicalize().is_ok_and(|second| first == second))
 }
 
 fn process(

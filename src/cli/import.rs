@@ -61,7 +61,8 @@ struct CamaraMap {
     /// The mission's name.
     #[arg(long, default_value = "camara")]
     name: String,
-    /// Directory for the mission's files; created if it does not exist.
+    /// Directory for the mission's files; created if it does not exist. Existing files with another content are not
+    /// overwritten.
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
 }
@@ -116,19 +117,21 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let files = import_map(file.name(), file.text(), &options)?;
     output::warnings(common, &files.warnings);
-    output::make_directory(&map.output)?;
-    let manifest = format!("{}.toml", map.name);
+    output::require_directory(&map.output)?;
+    let manifest = map.output.join(format!("{}.toml", map.name));
     let written = [
-        (manifest.clone(), &files.manifest),
-        (format!("{}.ttl", map.name), &files.knowledge),
-        ("domain.pddl".to_owned(), &files.domain),
-        ("problem.pddl".to_owned(), &files.problem),
-        ("positions.csv".to_owned(), &files.positions),
+        (manifest.clone(), &*files.manifest),
+        (map.output.join(format!("{}.ttl", map.name)), &files.knowledge),
+        (map.output.join("domain.pddl"), &files.domain),
+        (map.output.join("problem.pddl"), &files.problem),
+        (map.output.join("positions.csv"), &files.positions),
     ];
-    for (name, text) in &written {
-        output::write_file(&map.output.join(name), text)?;
+    output::require_unchanged(written.clone())?;
+    output::make_directory(&map.output)?;
+    for (path, text) in &written {
+        output::write_file(path, text)?;
     }
-    let manifest = map.output.join(manifest).display().to_string();
+    let manifest = manifest.display().to_string();
     match common.format {
         Format::Json => output::json_answer(&ImportAnswer::new(manifest)),
         _ => output::answer(&format!("{manifest}\n")),

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::answers::ErrorAnswer;
 use crate::file;
-use crate::message::Message;
+use crate::message::{Errors, Message};
 pub use crate::visible::pretty;
 use crate::visible::{visible, visible_json};
 use comfy_table::{ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
@@ -143,6 +143,31 @@ pub fn require_directory(path: &Path) -> Result<(), Failure> {
     let text = "`-` is standard output, but several files are written; name a directory (`./-` for a directory \
                 with this name)";
     Err(Failure::usage(Message::error("M107", text)))
+}
+
+/// Checks that [`file::create_directory`] can start a new directory, before its files are computed.
+pub fn require_new_directory(path: &Path) -> Result<(), Failure> {
+    require_directory(path)?;
+    file::create_directory(path).map(drop).map_err(|error| {
+        let text = format!("the directory cannot be written: {}", error.kind());
+        Message::at("M109", &path.display().to_string(), None, text).into()
+    })
+}
+
+/// Checks that none of the files, given by path and new content, exists with another content.
+pub fn require_unchanged<'f>(files: impl IntoIterator<Item = (PathBuf, &'f str)>) -> Result<(), Failure> {
+    let is_changed = |path: &Path, text: &str| {
+        path.symlink_metadata().is_ok()
+            && !(path.is_file() && std::fs::read(path).is_ok_and(|content| content == text.as_bytes()))
+    };
+    let changed = files.into_iter().filter(|(path, text)| is_changed(path, text));
+    Ok(Errors::unless_empty(changed.map(|(path, _)| exists(&path)))?)
+}
+
+/// Returns the error that a file exists and would be overwritten.
+pub fn exists(path: &Path) -> Message {
+    let text = "this file exists already and is not overwritten; choose another directory";
+    Message::at("M133", &path.display().to_string(), None, text)
 }
 
 /// Returns the number of columns for answers: the environment variable `COLUMNS`, or the width of the terminal. Returns

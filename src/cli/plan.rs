@@ -211,7 +211,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let started = Instant::now();
     let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
     arguments.check()?;
-    arguments.certificate.as_deref().map_or(Ok(()), output::require_directory)?;
+    arguments.certificate.as_deref().map_or(Ok(()), output::require_new_directory)?;
 
     let setup = arguments.situation.setup(&arguments.inputs, common)?;
     let is_drawn = arguments.report.is_some() || arguments.drawing.is_file_wanted();

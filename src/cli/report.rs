@@ -1,7 +1,7 @@
 //! The command `metaplan report`, which writes a plan or a journal as an HTML page.
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::certificate::{Verification, Verifier};
 use crate::journal::JournalReport;
@@ -16,6 +16,8 @@ use num_rational::BigRational;
 use picture::{Checked, Plan, Report};
 use planner::{Limits, Solution, Status};
 
+use ::verify::Watch;
+
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::concurrent::Overlap;
 use crate::cli::drawn::write_pictures;
@@ -25,6 +27,9 @@ use crate::cli::plan::exit;
 use crate::cli::progress::during;
 use crate::cli::situation::Situation;
 use crate::cli::values::seconds;
+
+/// Time limit of the verification of a certificate without `--time-limit`, as the default of `verify`.
+const VERIFICATION_TIME: Duration = Duration::from_secs(600);
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
@@ -61,6 +66,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let text = "`report` writes HTML; the same data come as JSON from `plan --format json`";
         return Err(Failure::usage(Message::error("M107", text)));
     }
+    let started = Instant::now();
     let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
     arguments.svg.as_deref().map_or(Ok(()), output::require_directory)?;
     if let Some(directory) = &arguments.journal {
@@ -85,27 +91,64 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         }
         None => None,
     };
-    let checked = arguments
-        .certificate
-        .as_deref()
-        .map(|directory| Verifier::new(directory).mission(&setup.mission).stop(|| limits.reached()))
-        .map(|verifier| checked(&during("verifying", common, || verifier.verify())));
-    let (status, said) = (answer.solution.status, answer.solution.verdict());
-    let rejected =
-        checked.as_ref().filter(|checked| !checked.verified).map(|checked| checked.verdict.clone());
-    let report = page(arguments, &setup, before, answer, checked);
-    if let Some(directory) = &arguments.svg {
-        write_pictures(directory, &report.pictures())?;
+    let (exit, verdict) = (exit(answer.solution.status), format!("{}\n", answer.solution.verdict()));
+    let page = Page {
+        report: page(arguments, &setup, before, answer),
+        svg: arguments.svg.clone(),
+        output: arguments.output.clone(),
+        verdict,
+        exit,
+    };
+    let Some(directory) = arguments.certificate.as_deref() else { return page.write(None) };
+    if limits.reached() {
+        return page.write(Some((directory, unchecked())));
     }
-    write(arguments, &report.html(), &format!("{said}\n"))?;
-    if let (Some(verdict), Some(directory)) = (rejected, &arguments.certificate) {
-        output::note(&format!("{}: {verdict}\n", directory.display()));
-        // At the limit, the certificate was not checked to its end.
-        if !limits.reached() {
-            return Ok(Exit::Invalid);
+    let late = (page.clone(), directory.to_owned(), common.clone());
+    let time = arguments.time_limit.map(|limit| limit.saturating_sub(started.elapsed()));
+    let watch = Watch::start(time.unwrap_or(VERIFICATION_TIME), move |_| {
+        let (page, directory, common) = late;
+        let written = page.write(Some((&directory, unchecked())));
+        let exit = written.unwrap_or_else(|failure| {
+            output::failure(&common, &failure.messages);
+            failure.exit
+        });
+        std::process::exit(exit as i32)
+    });
+    let verifier =
+        Verifier::new(directory).mission(&setup.mission).stop(|| watch.reached() || limits.reached());
+    let verification = watch.end(during("verifying", common, || verifier.verify()));
+    page.write(Some((directory, checked(&verification, limits.reached()))))
+}
+
+/// A page that is complete except for the verification of a certificate.
+#[derive(Clone)]
+struct Page {
+    report: Report,
+    svg: Option<PathBuf>,
+    output: Option<PathBuf>,
+    /// Verdict on the plan, a line for standard error.
+    verdict: String,
+    /// Exit status unless a certificate is rejected.
+    exit: Exit,
+}
+
+impl Page {
+    /// Writes the page and its pictures, with the verification of a certificate if there is one. Returns the exit
+    /// status.
+    fn write(mut self, certificate: Option<(&Path, Checked)>) -> Result<Exit, Failure> {
+        let rejected = certificate.as_ref().filter(|(_, checked)| !checked.verified);
+        let note = rejected
+            .map(|(directory, checked)| format!("{}: {}\n", directory.display(), checked.verdict))
+            .unwrap_or_default();
+        let is_invalid = rejected.is_some_and(|(_, checked)| !checked.stopped);
+        self.report.checked = certificate.map(|(_, checked)| checked);
+        if let Some(directory) = &self.svg {
+            write_pictures(directory, &self.report.pictures())?;
         }
+        write(self.output.as_ref(), &self.report.html(), &self.verdict)?;
+        output::note(&note);
+        Ok(if is_invalid { Exit::Invalid } else { self.exit })
     }
-    Ok(exit(status))
 }
 
 fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> Result<Exit, Failure> {
@@ -113,13 +156,13 @@ fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> R
     if let Some(directory) = &arguments.svg {
         write_pictures(directory, &[("log.svg".to_owned(), log.svg())])?;
     }
-    write(arguments, &log.html(), &format!("{}\n", log.verdict))?;
+    write(arguments.output.as_ref(), &log.html(), &format!("{}\n", log.verdict))?;
     Ok(if report.is_sound() { Exit::Done } else { Exit::BadInput })
 }
 
-fn write(arguments: &Arguments, page: &str, said: &str) -> Result<(), Failure> {
+fn write(file: Option<&PathBuf>, page: &str, said: &str) -> Result<(), Failure> {
     let page = &*visible(page);
-    match output::file_named(arguments.output.as_ref()) {
+    match output::file_named(file) {
         Some(file) => {
             output::write_file(file, page)?;
             output::note(said);
@@ -158,13 +201,7 @@ impl Answer {
     }
 }
 
-fn page(
-    arguments: &Arguments,
-    setup: &Setup,
-    before: Option<(&Setup, Answer)>,
-    answer: Answer,
-    checked: Option<Checked>,
-) -> Report {
+fn page(arguments: &Arguments, setup: &Setup, before: Option<(&Setup, Answer)>, answer: Answer) -> Report {
     let name = match (setup.mission.name.as_str(), arguments.inputs.last()) {
         ("", Some(problem)) => problem.display().to_string(),
         (name, _) => name.to_owned(),
@@ -179,16 +216,27 @@ fn page(
         before: before.map(|(_, answer)| answer.plan),
         plan: answer.plan,
         changes: compared.unwrap_or_default(),
-        checked,
+        checked: None,
     }
 }
 
-fn checked(report: &Verification) -> Checked {
+/// Converts the result of a verification. `is_interrupted` states whether a limit may have ended it early.
+fn checked(report: &Verification, is_interrupted: bool) -> Checked {
     let parts = report.parts.iter().map(|part| {
         let (Ok(said) | Err(said)) = &part.result;
         (part.part.to_owned(), part.result.is_ok(), said.clone())
     });
+    let parts = parts.collect();
+    if !report.verified() && (is_interrupted || report.parts.iter().any(|part| part.part == "limits")) {
+        return Checked { parts, ..unchecked() };
+    }
     let text = report.to_string();
     let verdict = text.lines().last().unwrap_or_default().to_owned();
-    Checked { verified: report.verified(), verdict, parts: parts.collect() }
+    Checked { verified: report.verified(), stopped: false, verdict, parts }
+}
+
+/// Result of a verification that a limit has ended.
+fn unchecked() -> Checked {
+    let verdict = "not checked: a limit on time or memory was reached".to_owned();
+    Checked { verified: false, stopped: true, verdict, parts: Vec::new() }
 }

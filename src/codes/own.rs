@@ -136,8 +136,8 @@ pub const CODES: &[[&str; 4]] = &[
     ],
     [
         "M133",
-        "The directory exists already.",
-        "`init` creates a new directory and never overwrites files.",
+        "The directory or file exists already.",
+        "`init` and `import` never overwrite files, and `export` does not overwrite the files of the mission.",
         "Choose another name.",
     ],
     [

@@ -29,6 +29,9 @@ use crate::mission::numbers::against;
 
 const MAX_TRIED: usize = 2_000;
 
+/// Entry of [`Availability::unexamined`].
+const INITIAL_STATE: &str = "changes of the initial state of the problem";
+
 /// Availability of one design and its causes, derived without planning.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -37,7 +40,7 @@ pub struct Availability {
     pub design: String,
     /// Local names of the functions that the design solves.
     pub functions: Vec<String>,
-    /// `true` if the design is available.
+    /// `true` if the design is available in the initial state.
     pub available: bool,
     /// Rules and facts that rule the design out, and reasons why some actions could not use the design even if it were
     /// available.
@@ -144,10 +147,11 @@ fn nearest(sets: &[Vec<Alteration>]) -> Vec<Vec<Alteration>> {
 }
 
 pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
+    let available = mission.is_available(&mission.current(), &design.individual.name);
     let mut availability = Availability {
         design: design.individual.name.clone(),
         functions: design.solves.iter().map(|function| function.name.clone()).collect(),
-        available: design.available,
+        available,
         // Reasons why some actions could not use the design even if it were available.
         because: against(mission, &design.individual.name),
         causes: Vec::new(),
@@ -155,6 +159,16 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         unexamined: Vec::new(),
     };
     let Some(knowledge) = mission.knowledge() else { return availability };
+    if available != design.available {
+        let text = if available {
+            "the knowledge base rules it out, but in the initial state the axioms of the domain do not"
+        } else {
+            "in the initial state the axioms of the domain rule it out, but the knowledge base alone does not"
+        };
+        availability.because.push(text.to_owned());
+        availability.unexamined.push(INITIAL_STATE.to_owned());
+        return availability;
+    }
     if design.available {
         let loses = |alteration: &Alteration| {
             altered(knowledge, [alteration]).is_some_and(|knowledge| !is_available(&knowledge, design))
@@ -164,11 +178,13 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         let ways: Vec<_> = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
         availability.ways = nearest(&ways);
         availability.unexamined = bounds.unexamined;
+        availability.confirm(mission);
         return availability;
     }
     let Ways { sets, unexamined } = ways(knowledge, design);
     availability.ways = sets;
     availability.unexamined = unexamined;
+    availability.confirm(mission);
     availability.causes = causes_of(knowledge, design, &availability.ways);
     let derived = ruled_out(knowledge, &design.individual.name);
     for line in availability.causes.iter().flat_map(|cause| &cause.because).chain(&derived) {
@@ -177,6 +193,28 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         }
     }
     availability
+}
+
+impl Availability {
+    /// In PLANTA's form, omits the sets of alterations after which the axioms of the domain do not change the
+    /// availability of the design, for example because of facts of the problem.
+    fn confirm(&mut self, mission: &Mission) {
+        if mission.completed_predicates().is_none() {
+            return;
+        }
+        let changes = |way: &Vec<Alteration>| {
+            let mut mission = mission.clone();
+            let knowledge = mission.knowledge_mut()?;
+            *knowledge = altered(knowledge, way)?;
+            Some(mission.is_available(&mission.current(), &self.design) != self.available)
+        };
+        let (sufficient, insufficient): (Vec<_>, Vec<_>) =
+            self.ways.iter().cloned().partition(|way| changes(way) == Some(true));
+        self.ways = sufficient;
+        if !insufficient.is_empty() {
+            self.unexamined.push(INITIAL_STATE.to_owned());
+        }
+    }
 }
 
 /// Returns minimal sets of `candidates` that make a design available (see [`minimal`]). After the largest sets, at most

@@ -15,10 +15,13 @@ mod rule_bounds;
 mod solve;
 mod thresholds;
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 
-use ontology::tomasys::FunctionDesign;
+use ontology::tomasys::{FunctionDesign, Individual};
 use ontology::vocab::local_name;
+use pddl::Mentioned;
+use pddl::ast::{Domain, Problem};
 use planner::Limits;
 
 use crate::mapek::PlannedStep;
@@ -122,11 +125,6 @@ impl Availability {
     ) -> Result<DesignExplanation, Errors> {
         let (found, designs) = find(mission, &self.design)?;
         let name = self.design.as_str();
-        let rivals: BTreeSet<&str> = designs
-            .iter()
-            .filter(|other| other.solves.iter().any(|function| found.solves.contains(function)))
-            .map(|other| other.individual.name.as_str())
-            .collect();
         hear("the best plan");
         let best = best(mission, limits)?;
         let uses = |step: &PlannedStep| step.configuration.iter().any(|(_, design)| design == name);
@@ -138,11 +136,10 @@ impl Availability {
             repairs.push(Repair { alterations: way.clone(), then });
         }
         hear("it as the only design");
-        let alone = solve(mission, limits, &|other, available| {
-            other == name || available && !rivals.contains(other)
-        })?;
+        let alone = solve(mission, limits, &|problem| only_design(mission, found, designs, problem))?;
         hear("without it");
-        let without = solve(mission, limits, &|other, available| other != name && available)?;
+        let is_excluded = |design: &str| (design == name).then_some(false);
+        let without = solve(mission, limits, &|problem| mission.allow(problem, &is_excluded))?;
         hear("single changes");
         let changes = causes::singly(mission, &repairs, limits)?;
         let plans = [&best, &alone, &without].into_iter();
@@ -150,4 +147,31 @@ impl Availability {
         let complete = plans.chain(changes.iter().map(|change| &change.then)).all(|plan| plan.proved);
         Ok(DesignExplanation { availability: self, best, used, alone, without, repairs, changes, complete })
     }
+}
+
+/// Changes a filled problem so that `design` is available and the only one of `designs` for its functions. Returns the
+/// domain for this problem. A design that also solves other functions is kept for these if conditions of the domain
+/// read which design solves which function.
+fn only_design<'m>(
+    mission: &'m Mission,
+    design: &'m FunctionDesign,
+    designs: &'m [FunctionDesign],
+    problem: &mut Problem,
+) -> Cow<'m, Domain> {
+    let name_of = |design: &'m FunctionDesign| design.individual.name.as_str();
+    let is_shared = |function: &Individual| design.solves.contains(function);
+    let read = Mentioned::by_domain(mission.domain()).predicates;
+    let is_solved_read = mission.solves().iter().any(|predicate| read.contains(predicate));
+    let rivals = designs.iter().filter(|rival| rival.individual != design.individual);
+    let rivals = rivals.filter(|rival| rival.solves.iter().any(is_shared));
+    let (partial, full): (Vec<_>, Vec<_>) =
+        rivals.partition(|rival| is_solved_read && !rival.solves.iter().all(is_shared));
+    let full: BTreeSet<&str> = full.into_iter().map(name_of).collect();
+    let mut domain = mission.allow(problem, &|candidate| {
+        if candidate == name_of(design) { Some(true) } else { full.contains(candidate).then_some(false) }
+    });
+    let partial: Vec<&str> = partial.into_iter().map(name_of).collect();
+    let functions: Vec<&str> = design.solves.iter().map(|function| function.name.as_str()).collect();
+    mission.withdraw_functions(&mut domain, problem, &partial, &functions);
+    domain
 }

@@ -1,5 +1,8 @@
 //! Computes the best plan for a mission, with all or with some of its designs.
 
+use std::borrow::Cow;
+
+use pddl::ast::{Domain, Problem};
 use planner::{Config, Limits, Status, optimize};
 
 use crate::explain::parts::BestPlan;
@@ -14,21 +17,21 @@ use crate::number;
 /// # Errors
 /// The mission cannot be planned for.
 pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Errors> {
-    solve(mission, limits, &|_, available| available)
+    solve(mission, limits, &|problem| mission.allow(problem, &|_| None))
 }
 
-/// Computes the best plan with only the designs for which `allowed` returns `true`, in at most half of the remaining
-/// time. The arguments of `allowed` are the name of a design, and `true` if the design is available.
-pub(super) fn solve(
-    mission: &Mission,
+/// Computes the best plan for a variant of a mission, in at most half of the remaining time. `vary` changes the filled
+/// problem and returns its domain.
+pub(super) fn solve<'m>(
+    mission: &'m Mission,
     limits: &Limits,
-    allowed: &dyn Fn(&str, bool) -> bool,
+    vary: &dyn Fn(&mut Problem) -> Cow<'m, Domain>,
 ) -> Result<BestPlan, Errors> {
     if limits.reached() {
         return Ok(BestPlan::default());
     }
     let (mut problem, _) = mission.filled()?;
-    let domain = mission.allow(&mut problem, allowed);
+    let domain = vary(&mut problem);
     // Half of the remaining time is reserved for later queries.
     let limits = &limits.half();
     let task = match ground_with(mission, &domain, &problem, &[], limits) {

@@ -56,8 +56,8 @@ pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option
     if designs.is_empty() {
         return None;
     }
-    let missing: Vec<String> =
-        designs.into_iter().filter(|design| !design.available).map(|design| design.individual.name).collect();
+    let names = designs.into_iter().map(|design| design.individual.name);
+    let missing: Vec<String> = names.filter(|name| !mission.is_available(problem, name)).collect();
     let mut blocking = missing.clone();
     if solvable_with(mission, problem, &missing, config)? {
         for design in &missing {
@@ -85,9 +85,8 @@ fn solvable_with(
     let mut problem = problem.clone();
     // The metric does not affect solvability.
     problem.metric = None;
-    let domain = mission.allow(&mut problem, &|design, is_available| {
-        is_available || available.iter().any(|name| name == design)
-    });
+    let is_added = |design: &str| available.iter().any(|name| name == design).then_some(true);
+    let domain = mission.allow(&mut problem, &is_added);
     let task = ground_with(mission, &domain, &problem, &[], &config.limits).ok()?;
     match optimize(&task, config, &mut |_| {}).status {
         Status::Optimal | Status::Feasible => Some(true),

@@ -3,6 +3,7 @@
 
 mod brute;
 mod examples;
+mod explain;
 mod files;
 mod random;
 mod situations;

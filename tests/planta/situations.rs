@@ -13,7 +13,7 @@ use test_resources::{data, data_path};
 use crate::brute::Task;
 use crate::files::{Input, metaplan, parsed, real};
 
-fn extended(real: &Path) -> Input {
+pub fn extended(real: &Path) -> Input {
     Input {
         domain: real.join("pddl/suave_planta/suave_domain_extended.pddl"),
         problem: real.join("pddl/suave_planta/suave_problem_extended.pddl"),

@@ -122,6 +122,55 @@ fn a_domain_and_a_problem_are_explained_as_a_manifest() {
     assert!(outcome.stderr.contains("give the problem, too: DOMAIN PROBLEM"), "{outcome:#?}");
 }
 
+/// A design that also solves another function remains available for it. The expected costs are the smallest sums over
+/// the admitted designs for `f1` (`d` or `r`) and `f2` (`r` or `e`).
+#[test]
+fn rivals_keep_their_other_functions() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = |name: &str, text: &str| {
+        let path = directory.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        path.display().to_string()
+    };
+    let domain = file(
+        "domain.pddl",
+        "(define (domain d) (:requirements :action-costs) (:predicates (done)) (:functions (energy) (total-cost))
+          (:action work :parameters () :precondition () :effect (and (done) (increase (total-cost) (energy)))))",
+    );
+    let problem = file(
+        "problem.pddl",
+        "(define (problem p) (:domain d) (:init (= (total-cost) 0)) (:goal (done))
+          (:metric minimize (total-cost)))",
+    );
+    // Without the import of TOMASys, where `solvesF` is functional and would make the functions of `r` equal.
+    let knowledge = "@prefix : <urn:m#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .
+        @prefix t: <http://metacontrol.org/tomasys#> .\n<urn:m> a owl:Ontology .
+        :energy a t:QualityAttributeType . :f1 a t:Function . :f2 a t:Function .
+        :a_work a t:Action ; t:requiresF :f1 , :f2 .\n";
+    let design = |name: &str, functions: &str, energy: u32| {
+        format!(
+            ":{name} a t:FunctionDesign ; t:solvesF {functions} ; t:hasQAestimation :e_{name} .
+             :e_{name} a t:QAvalue ; t:isQAtype :energy ; t:hasValue {energy}.0 .\n"
+        )
+    };
+    let two = knowledge.to_owned() + &design("d", ":f1", 5) + &design("r", ":f1 , :f2", 1);
+    let three = two.clone() + &design("e", ":f2", 10);
+    // Design, cost of the best plan with it as the only design of its functions, and cost without it.
+    for (knowledge, design, alone, without) in [
+        (&two, "d", json!(6), json!(2)),
+        (&two, "r", json!(2), json!(null)),
+        (&three, "d", json!(6), json!(2)),
+        (&three, "r", json!(2), json!(15)),
+        (&three, "e", json!(11), json!(2)),
+    ] {
+        let knowledge = file("robot.ttl", knowledge);
+        let answer = explain(&[&domain, &problem, design, "--kb", &knowledge]);
+        let costs = json!([answer["best"]["cost"], answer["alone"]["cost"], answer["without"]["cost"]]);
+        assert_eq!(costs, json!([2, alone, without]), "{design}: {answer:#}");
+        assert_eq!(answer["complete"], true, "{design}: {answer:#}");
+    }
+}
+
 #[test]
 fn unknown_designs_are_usage_errors() {
     let outcome = metaplan(&["explain", "missions/ugv.toml", "fd_none"]);

@@ -1,6 +1,6 @@
 //! Tests of `metaplan export`: the exported input for other planners has the same optimum as the mission.
 
-use crate::common::{metaplan, metaplan_in, root};
+use crate::common::{headlines, metaplan, metaplan_in, root};
 
 const MISSIONS: [(&str, &[&str], i64); 4] = [
     ("missions/ugv.toml", &[], 408),
@@ -43,6 +43,30 @@ fn variants_of_the_probabilistic_model_are_no_variants_of_pddl() {
         let outcome = metaplan(&["export", "missions/ugv.toml", "--to", "pddl", "--setting", setting]);
         assert_eq!((outcome.status, outcome.stdout.as_str()), (2, ""), "{outcome:#?}");
         assert!(outcome.stderr.contains("error[M107]: `--setting` selects a variant"), "{outcome:#?}");
+    }
+}
+
+/// The exported files have other contents than the files of the mission, so they must not replace them.
+#[test]
+fn files_of_the_mission_are_not_overwritten() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let here = directory.path();
+    assert_eq!(metaplan_in(here, &["init", "m"], "").status, 0);
+    let files = ["m/domain.pddl", "m/problem.pddl"];
+    let texts = || files.map(|file| std::fs::read_to_string(here.join(file)).expect("text"));
+    let before = texts();
+    for inputs in [&["m/mission.toml"][..], &["m/domain.pddl", "./m/problem.pddl"]] {
+        let arguments = [&["export", "--to", "pddl", "-o", "m"], inputs].concat();
+        let outcome = metaplan_in(here, &arguments, "");
+        assert_eq!(outcome.status, 3, "{outcome:#?}");
+        for file in files {
+            assert!(headlines(&outcome.stderr).contains(&format!("{file}: error[M133]: ")), "{outcome:#?}");
+        }
+    }
+    assert_eq!(texts(), before);
+    for fail in [&[][..], &["--fail", "c_first"]] {
+        let arguments = [&["export", "m/mission.toml", "--to", "pddl", "-o", "out"], fail].concat();
+        assert_eq!(metaplan_in(here, &arguments, "").status, 0, "other files are replaced");
     }
 }
 

@@ -175,23 +175,28 @@ fn incomplete_comparisons_are_reported_in_text_output() {
     panic!("nothing was ever shown");
 }
 
+/// A directory that cannot become a certificate is refused before planning.
 #[test]
 fn unwritable_certificates_are_errors() {
     let directory = tempfile::tempdir().expect("a directory");
-    let nonempty = directory.path().join("full");
-    std::fs::create_dir(&nonempty).expect("a directory");
-    std::fs::write(nonempty.join("a"), "").expect("a file");
-    let nonempty = nonempty.display().to_string();
-    for options in [&[][..], &["-q"], &["--format", "json"], &["-q", "--format", "json"]] {
-        let arguments: Vec<&str> = ["plan", "missions/ugv.toml", "--certificate", &nonempty]
-            .into_iter()
-            .chain(options.iter().copied())
-            .collect();
-        let outcome = metaplan(&arguments);
-        assert_eq!(outcome.status, 3, "{outcome:#?}");
-        assert!(outcome.stderr.contains("M109"), "{outcome:#?}");
-        assert!(outcome.stdout.contains("408"), "the plan is there: {outcome:#?}");
+    let file = directory.path().join("full/a");
+    std::fs::create_dir(directory.path().join("full")).expect("a directory");
+    std::fs::write(&file, "").expect("a file");
+    for (name, reason) in
+        [("full", "directory not empty"), ("full/a", "not a directory"), ("no/such", "not found")]
+    {
+        let target = directory.path().join(name).display().to_string();
+        for options in [&[][..], &["-q"], &["--format", "json"], &["-q", "--format", "json"]] {
+            let arguments = ["plan", "missions/ugv.toml", "--certificate", &target];
+            let outcome = metaplan(&[&arguments[..], options].concat());
+            assert_eq!(outcome.status, 3, "{outcome:#?}");
+            let text = outcome.stdout + &outcome.stderr;
+            assert!(text.contains("M109") && text.contains(reason), "{name}: {text}");
+            assert!(!text.contains("408"), "{name}: it is planned: {text}");
+        }
     }
+    let names = std::fs::read_dir(directory.path().join("full")).expect("a directory");
+    assert_eq!(names.map(|entry| entry.expect("an entry").path()).collect::<Vec<_>>(), [file]);
 }
 
 #[test]

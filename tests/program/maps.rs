@@ -214,3 +214,23 @@ fn places_are_drawn_at_their_coordinates() {
         assert!((right - x * scale).abs() < 0.3 && (up - y * scale).abs() < 0.3, "{name}: {right} {up}");
     }
 }
+
+/// Nothing is written if a file with another content exists. The same import can be repeated.
+#[test]
+fn imports_do_not_overwrite_other_files() {
+    let directory = tempfile::tempdir().expect("a directory");
+    for _ in 0..2 {
+        let outcome = import(directory.path(), &map(), &[]);
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+    }
+    let out = directory.path().join("out");
+    std::fs::write(out.join("domain.pddl"), "mine").expect("written");
+    std::fs::remove_file(out.join("positions.csv")).expect("removed");
+    let outcome = import(directory.path(), &map(), &["--no-battery"]);
+    assert_eq!((outcome.status, outcome.stdout.as_str()), (3, ""), "{outcome:#?}");
+    for file in ["out/domain.pddl", "out/problem.pddl"] {
+        assert!(headlines(&outcome.stderr).contains(&format!("{file}: error[M133]: ")), "{outcome:#?}");
+    }
+    assert_eq!(std::fs::read_to_string(out.join("domain.pddl")).expect("text"), "mine");
+    assert!(!out.join("positions.csv").exists());
+}

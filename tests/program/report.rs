@@ -232,6 +232,25 @@ fn certificates_are_verified_and_shown() {
     }
 }
 
+/// If planning takes all the time, the certificate is not checked, so it is not rejected either.
+#[cfg(unix)]
+#[test]
+fn certificates_are_not_rejected_at_the_time_limit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let certificate = folder.path().join("certificate").display().to_string();
+    assert_eq!(metaplan(&["plan", "missions/ugv.toml", "--certificate", &certificate]).status, 0);
+    let (domain, problem) = crate::limits::round_trip(24);
+    std::fs::write(folder.path().join("domain.pddl"), domain).expect("a file");
+    std::fs::write(folder.path().join("problem.pddl"), problem).expect("a file");
+    let arguments =
+        ["report", "domain.pddl", "problem.pddl", "--time-limit", "3", "--certificate", "certificate"];
+    let outcome = metaplan_in(folder.path(), &arguments, "");
+    assert_eq!(outcome.status, 1, "{}", outcome.stderr);
+    let verdict = "not checked: a limit on time or memory was reached";
+    assert!(outcome.stdout.contains(verdict) && outcome.stderr.contains(verdict), "{}", outcome.stderr);
+    assert!(!outcome.stdout.contains(">failed<") && !outcome.stdout.contains("NOT verified"));
+}
+
 #[test]
 fn hostile_names_are_escaped() {
     let hostile = "</script><script>alert(1)</script>\u{202e}";

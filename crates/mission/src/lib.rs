@@ -24,6 +24,7 @@ mod planta;
 mod set;
 mod values;
 pub mod visible;
+mod withdraw;
 
 pub use binding::{Bindings, atom};
 pub use called::{Names, Place};

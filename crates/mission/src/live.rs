@@ -13,6 +13,8 @@ use crate::binding;
 use crate::joined::Mission;
 use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message};
+use crate::planta::Planta;
+use crate::withdraw::withdraw;
 
 impl Mission {
     /// Adds the current objects, facts and values of the knowledge base to a problem of this mission. Returns
@@ -147,22 +149,33 @@ impl Mission {
         self.decides_on(design) && predicates.any(|predicate| self.holds(&format!("{predicate} {design}")))
     }
 
-    /// Replaces the available designs of a filled problem and returns the domain for that problem. All predicates
+    /// Returns `true` if a design of the knowledge base, given by its name, is available in the initial state of a
+    /// filled problem. In PLANTA's form, the axioms of the domain decide, which also read the facts of the problem.
+    /// Otherwise, the conclusions of the knowledge base decide.
+    pub fn is_available(&self, problem: &Problem, design: &str) -> bool {
+        if let Some(planta) = &self.planta {
+            return planta.is_available(&self.domain, problem, design);
+        }
+        let mut designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
+        designs.any(|candidate| candidate.individual.name == design && candidate.available)
+    }
+
+    /// Changes which designs of a filled problem are available and returns the domain for that problem. All predicates
     /// that are bound to availability change. Without such a predicate, the problem is unchanged.
     ///
-    /// `allowed` is called with the name of each design of the knowledge base and its current
-    /// availability; the design becomes available if the result is `true`. Designs whose
-    /// availability is stated by the problem are kept.
-    pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) -> Cow<'_, Domain> {
+    /// `allowed` is called with the name of each design of the knowledge base. The design is then available or not as
+    /// in the result, throughout the plan; with `None` as without this call. Designs whose availability is stated by
+    /// the problem are kept.
+    pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str) -> Option<bool>) -> Cow<'_, Domain> {
         let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
         let designs = designs.map(|design| (design.individual.name.as_str(), design.available));
         // In PLANTA's form, derived predicates of the domain express availability.
         if let Some(planta) = &self.planta {
-            let says = designs.map(|(design, available)| (design, allowed(design, available)));
-            return Cow::Owned(planta.allow(&self.domain, problem, says));
+            let changes = designs.filter_map(|(design, _)| Some((design, allowed(design)?)));
+            return planta.allow(&self.domain, problem, changes);
         }
         let allowed: Vec<&str> = designs
-            .filter(|(design, available)| allowed(design, *available))
+            .filter(|(design, available)| allowed(design).unwrap_or(*available))
             .map(|(design, _)| design)
             .collect();
         let declared = self.domain.predicates.iter().filter(|declared| declared.parameters.len() == 1);
@@ -175,6 +188,26 @@ impl Mission {
             problem.init.extend(allowed.iter().map(fact));
         }
         Cow::Borrowed(&self.domain)
+    }
+
+    /// Withdraws from a filled problem and its `domain` that designs solve functions, given by their names: each of the
+    /// designs solves none of the functions.
+    pub fn withdraw_functions(
+        &self,
+        domain: &mut Cow<'_, Domain>,
+        problem: &mut Problem,
+        designs: &[&str],
+        functions: &[&str],
+    ) {
+        let predicates = self.solves();
+        if self.planta.is_some() {
+            return Planta::withdraw_functions(domain, problem, &predicates, (designs, functions));
+        }
+        let [designs, functions] =
+            [designs, functions].map(|names| names.iter().map(|name| Name::new(name)).collect::<Vec<_>>());
+        for predicate in predicates {
+            withdraw(domain, problem, &predicate, (&designs, &functions));
+        }
     }
 
     /// Returns the number of parameters of an action in the domain file if the knowledge base has
@@ -295,17 +328,17 @@ mod tests {
     fn all_predicates_for_availability_change() {
         let mission = mission("here - place", &[("usable", "available")]);
         let mut problem = mission.current().as_ref().clone();
-        let mut available = |allowed: &dyn Fn(&str, bool) -> bool| {
+        let mut available = |allowed: &dyn Fn(&str) -> Option<bool>| {
             mission.allow(&mut problem, allowed);
             ["fd_available", "usable"].map(|predicate| {
                 let is_fact = |element: &&InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name.as_str() == predicate);
                 problem.init.iter().filter(is_fact).count()
             })
         };
-        let [first, second] = available(&|_, _| true);
+        let [first, second] = available(&|_| Some(true));
         assert!(first > 1 && first == second, "{first} {second}");
-        assert_eq!(available(&|design, _| design == "fd_amcl_lidar"), [1, 1]);
-        assert_eq!(available(&|_, _| false), [0, 0]);
+        assert_eq!(available(&|design| Some(design == "fd_amcl_lidar")), [1, 1]);
+        assert_eq!(available(&|_| Some(false)), [0, 0]);
     }
 
     /// Only the errors of a goal are reported with the positions of its text.

@@ -155,6 +155,8 @@ pub struct Change {
 pub struct Checked {
     /// Whether all parts of the check succeeded.
     pub verified: bool,
+    /// Whether a limit ended the check, so that parts without success need not be wrong.
+    pub stopped: bool,
     /// The result in a sentence.
     pub verdict: String,
     /// The parts of the check: name, whether it succeeded, and finding.

@@ -240,11 +240,12 @@ fn designs(designs: &[Design]) -> Markup {
 }
 
 fn verified(checked: &Checked) -> Markup {
+    let failure = if checked.stopped { "not verified" } else { "failed" };
     let rows = html! {
         @for (part, holds, message) in &checked.parts {
             tr {
                 td { (part) }
-                td class=(if *holds { "good" } else { "bad" }) { (if *holds { "verified" } else { "failed" }) }
+                td class=(if *holds { "good" } else { "bad" }) { (if *holds { "verified" } else { failure }) }
                 td { (message) }
             }
         }

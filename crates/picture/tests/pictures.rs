@@ -77,6 +77,7 @@ fn report(steps: usize, name: &str) -> Report {
         changes: vec![Change { text: name.to_owned(), because: vec![Reason::default()] }],
         checked: Some(Checked {
             verified: true,
+            stopped: false,
             verdict: name.to_owned(),
             parts: vec![(name.to_owned(), true, name.to_owned())],
         }),

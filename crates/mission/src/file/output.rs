@@ -186,12 +186,15 @@ pub struct PendingDirectory {
 /// keeps its mode and owner, and may be a mount point.
 ///
 /// # Errors
-/// The target is not empty, or cannot be written.
+/// The target is not empty, is not a directory, or cannot be written.
 pub fn create_directory(path: &Path) -> io::Result<PendingDirectory> {
     let (target, _) = followed(path)?;
     let exists = target.is_dir();
     if exists && std::fs::read_dir(&target)?.next().is_some() {
         return Err(ErrorKind::DirectoryNotEmpty.into());
+    }
+    if !exists && target.symlink_metadata().is_ok() {
+        return Err(ErrorKind::NotADirectory.into());
     }
     let mut builder = tempfile::Builder::new();
     builder.prefix(".metaplan-");

@@ -19,18 +19,21 @@ mod swrl;
 mod syntax;
 mod terms;
 
+use std::borrow::Cow;
 use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 
 use ontology::Ontology;
-use pddl::ast::{Domain, InitialElement, Name, Problem, Term};
+use pddl::ast::{Condition, Domain, InitialElement, Name, Problem, Span, Term};
+use pddl::validate::{Options, PlanText, ViolationKind, validate};
 use pddl::{Mentioned, Source};
 use rules::{Engine, Fact, Literal, Value};
 
 use crate::message::{Message, did_you_mean};
+use crate::withdraw::withdraw;
 use complete::drop_repeated;
-use names::{EQUAL, LESS, NUMBER_TYPES, UNGROUND, UNREALISABLE};
-use syntax::{Fact as PddlFact, atom, object};
+use names::{EQUAL, GROUNDING, LESS, NUMBER_TYPES, UNGROUND, UNREALISABLE};
+use syntax::{Fact as PddlFact, atom, axiom, object, variable};
 pub(crate) use terms::Merged;
 pub use terms::Terms;
 
@@ -137,29 +140,77 @@ impl Planta {
         messages
     }
 
-    /// Sets which designs of a filled problem are available, by asserting that the other designs
-    /// are not realisable. The returned domain no longer infers realisability. `fd_unground` marks
-    /// a function without a design and is no design itself, so it is skipped.
+    /// Makes designs of a filled problem realisable (`true`) or unrealisable (`false`) in every state, and returns the
+    /// domain for this problem. The axioms decide about all other designs. `fd_unground` marks a function without a
+    /// design and is no design itself, so it is skipped.
     pub(crate) fn allow<'d>(
         &self,
-        domain: &Domain,
+        domain: &'d Domain,
         problem: &mut Problem,
         designs: impl Iterator<Item = (&'d str, bool)>,
-    ) -> Domain {
-        let (predicate, no) = (Name::new(UNREALISABLE), self.terms.literals.name(&Literal::Boolean(false)));
-        let mut domain = domain.clone();
-        domain.derived.retain(|own| own.head.identifier.name != predicate);
-        for (design, available) in designs.filter(|(design, _)| *design != UNGROUND) {
-            let arguments = vec![names::plain(design), no.clone()];
-            let withdrawn = Some((predicate.clone(), arguments.clone()));
-            problem.init.retain(|element| element.fact() != withdrawn);
-            if !available {
-                let arguments: Vec<Term> =
-                    arguments.into_iter().map(|name| Term::Constant(name.into())).collect();
-                problem.init.push(InitialElement::Fact(atom(predicate.clone(), arguments)));
+    ) -> Cow<'d, Domain> {
+        let predicate = Name::new(UNREALISABLE);
+        let is_object = |name: &Name| {
+            domain.constants.iter().chain(&problem.objects).any(|object| object.identifier.name == *name)
+        };
+        let is_declared = domain.predicates.iter().any(|declared| declared.identifier.name == predicate);
+        let no = self.no();
+        // No condition can read the realisability.
+        if !is_declared || !is_object(&no) {
+            return Cow::Borrowed(domain);
+        }
+        let designs = designs.filter(|(design, _)| *design != UNGROUND);
+        let designs = designs.map(|(design, available)| (names::plain(design), available));
+        let (permitted, forbidden): (Vec<_>, Vec<_>) =
+            designs.filter(|(design, _)| is_object(design)).partition(|(_, available)| *available);
+        let permitted: Vec<Name> = permitted.into_iter().map(|(design, _)| design).collect();
+        let mut domain = Cow::Borrowed(domain);
+        withdraw(&mut domain, problem, &predicate, (&permitted, std::slice::from_ref(&no)));
+        let is_derived = domain.derived.iter().any(|axiom| axiom.head.identifier.name == predicate);
+        for (design, _) in forbidden {
+            let [design, no] = [design, no.clone()].map(|name| Term::Constant(name.into()));
+            if is_derived {
+                let equal = |name, value| Condition::Equal(variable(name), value, Span::default());
+                let condition = Condition::And(vec![equal("x", design), equal("y", no)]);
+                domain.to_mut().derived.push(axiom(predicate.clone(), &["x", "y"], condition));
+            } else {
+                problem.init.push(InitialElement::Fact(atom(predicate.clone(), vec![design, no])));
             }
         }
         domain
+    }
+
+    /// Returns `true` if a design is realisable in the initial state of a filled problem, by the axioms of the domain.
+    pub(crate) fn is_available(&self, domain: &Domain, problem: &Problem, design: &str) -> bool {
+        let arguments = [names::plain(design), self.no()].map(|name| Term::Constant(name.into()));
+        let unrealisable = Condition::Atom(atom(Name::new(UNREALISABLE), arguments.into()));
+        let goal = Condition::Not(Box::new(unrealisable));
+        let problem = Problem { goal, ..problem.clone() };
+        let verdict = validate(domain, &problem, &PlanText::default(), &Options::default());
+        verdict.violation.is_none_or(|violation| violation.kind != ViolationKind::Goal)
+    }
+
+    /// Name of the value `false`.
+    fn no(&self) -> Name {
+        self.terms.literals.name(&Literal::Boolean(false))
+    }
+
+    /// Withdraws that `designs` solve `functions`, by the `predicates`, and that they are configured for them at the
+    /// start. Skips `fd_unground`.
+    pub(crate) fn withdraw_functions(
+        domain: &mut Cow<'_, Domain>,
+        problem: &mut Problem,
+        predicates: &[Name],
+        (designs, functions): (&[&str], &[&str]),
+    ) {
+        let objects = |names: &[&str]| -> Vec<Name> {
+            names.iter().filter(|name| **name != UNGROUND).map(|name| names::plain(name)).collect()
+        };
+        let (designs, functions) = (objects(designs), objects(functions));
+        for predicate in predicates {
+            withdraw(domain, problem, predicate, (&designs, &functions));
+        }
+        withdraw(domain, problem, &Name::new(GROUNDING), (&functions, &designs));
     }
 
     fn is_known(&self, predicate: &Name) -> bool {

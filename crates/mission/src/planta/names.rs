@@ -17,6 +17,8 @@ pub(super) const EQUAL: &str = "equalTo";
 pub(super) const INCONSISTENT: &str = "inferred-Inconsistent";
 /// Predicate of a design and a boolean. With `false`, the design is not realisable.
 pub(super) const UNREALISABLE: &str = "inferred-Fd_realisability";
+/// Predicate of a function and the design that is configured for it.
+pub(super) const GROUNDING: &str = "functionGrounding";
 /// Pseudo-design in PLANTA's domains that marks a function without a design.
 pub(super) const UNGROUND: &str = "fd_unground";
 /// Type names for numbers. The first name is the default; the second name is used only for domains
