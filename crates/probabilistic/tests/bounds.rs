@@ -154,6 +154,54 @@ fn rewards_with_an_integral_sum_in_doubles_are_enclosed() {
     enclosed(&cycle, "Rmin=? [ F s=2 ]");
 }
 
+/// The sums of 400 equal probabilities or shares of a reward, and of 100 equal rewards, would be too small if each addition
+/// were rounded.
+#[test]
+fn sums_of_many_summands_are_enclosed() {
+    let commands = "[t] true -> true;".repeat(20);
+    let synchronised = format!(
+        "dtmc module a {commands} endmodule module b {commands} endmodule
+         module m s:[0..1] init 0; [t] s=0 -> (s'=1); endmodule
+         rewards \"n\" [t] true : 1; endrewards"
+    );
+    let single = format!(
+        "dtmc module m s:[0..1] init 0; {} endmodule rewards \"n\" [t] true : 1; endrewards",
+        "[t] s=0 -> (s'=1);".repeat(400)
+    );
+    for model in [&synchronised, &single] {
+        for question in ["P=? [ F<=1 s=1 ]", "P=? [ X s=1 ]", "R{\"n\"}=? [ F s=1 ]", "R{\"n\"}=? [ C<=1 ]"] {
+            assert_eq!(enclosed(model, question).to_string(), "1", "{question}");
+            let bound = question.replacen("=?", ">=1", 1);
+            let options = Options::default().with_exactness(Exactness::Never);
+            let refuted = matches!(outcome(model, &bound, &options), Ok(Outcome::Truth(false, _)));
+            assert!(!refuted, "{bound}");
+        }
+    }
+    let items = "true : 0.1;".repeat(100);
+    let rewards =
+        format!("mdp module m s:[0..1] init 0; [] true -> (s'=1-s); endmodule rewards {items} endrewards");
+    for question in ["Rmin=? [ C<=1 ]", "Rmax=? [ F s=1 ]", "Rmin=? [ I=1 ]"] {
+        assert_eq!(enclosed(&rewards, question).to_string(), "10", "{question}");
+    }
+}
+
+/// The exact values are 1e-400.
+#[test]
+fn products_and_quotients_below_the_least_double_are_enclosed() {
+    let model = "dtmc
+        module m s:[0..2] init 0; [] s=0 -> 1e-200:(s'=1) + 1-1e-200:(s'=2); [] s>0 -> true; endmodule";
+    for question in ["(P=? [ F s=1 ]) * (P=? [ F s=1 ])", "(P=? [ F s=1 ]) / 1e200"] {
+        assert_ne!(enclosed(model, question), BigRational::default(), "{question}");
+        let options = Options::default().with_exactness(Exactness::Never);
+        let refuted =
+            matches!(outcome(model, &format!("{question} > 0"), &options), Ok(Outcome::Truth(false, _)));
+        assert!(!refuted, "{question}");
+    }
+    // A product with an exact 0 is exactly 0.
+    let zero = value(model, "(P=? [ F s=1 ]) * (P=? [ G s=1 ])", Exactness::Never);
+    assert_eq!([zero.lower, zero.upper].map(f64::to_bits), [0.0, 0.0].map(f64::to_bits));
+}
+
 #[test]
 fn step_bounded_values_are_enclosed() {
     let model = "dtmc

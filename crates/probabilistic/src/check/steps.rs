@@ -5,7 +5,7 @@ use crate::solve::{Direction, Problem, Work};
 
 /// Underflow threshold: positive products below this value may lose relative precision. The absolute error caused by
 /// such a loss is less than the threshold.
-const UNDERFLOW_THRESHOLD: f64 = 1e-280;
+pub const UNDERFLOW_THRESHOLD: f64 = 1e-280;
 
 pub struct Stepped<N> {
     pub values: Vec<N>,
