@@ -297,6 +297,41 @@ fn a_policy_is_evaluated_over_bounded_steps() {
     assert!(outcome(model, two_objectives, &Options::default().with_evaluation(evaluate)).is_err());
 }
 
+/// With this policy, the only path visits the states 0 and 1 and ends after one step.
+#[test]
+fn a_path_that_has_ended_makes_no_further_steps() {
+    let model = "mdp
+        module m s:[0..1] init 0; [a] s=0 -> (s'=1); [b] s=1 -> (s'=0); endmodule
+        rewards \"r\" true : 1; endrewards
+        label \"goal\" = s=1;";
+    let policy = "{\"format\": \"metaplan-policy/1\", \"states\": [{\"state\": {\"s\": 0}, \"action\": \"a\", \"choice\": 0}]}";
+    let without_states = "{\"format\": \"metaplan-policy/1\", \"states\": []}";
+    for (policy, question, expected) in [
+        (policy, "Pmax=? [ F[2,2] \"goal\" ]", "0"),
+        (policy, "Pmax=? [ F>=2 \"goal\" ]", "0"),
+        (policy, "Pmax=? [ F[1,2] \"goal\" ]", "1"),
+        (policy, "Pmax=? [ F<=2 \"goal\" ]", "1"),
+        (policy, "Pmin=? [ s=0 U[1,3] \"goal\" ]", "1"),
+        (policy, "Pmax=? [ G[2,2] s=0 ]", "1"),
+        (policy, "Pmax=? [ G[1,2] s=0 ]", "0"),
+        (policy, "R{\"r\"}max=? [ C<=3 ]", "1"),
+        (policy, "R{\"r\"}max=? [ I=1 ]", "1"),
+        (policy, "R{\"r\"}max=? [ I=2 ]", "0"),
+        (without_states, "Pmax=? [ X s=0 ]", "0"),
+        (without_states, "Pmin=? [ X s=0 ]", "0"),
+    ] {
+        for exactness in [Exactness::Always, Exactness::Never] {
+            let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
+            let options = Options::default().with_exactness(exactness).with_evaluation(evaluate);
+            let answer = outcome(model, question, &options).expect("an answer");
+            let Outcome::Value(Answer::Finite(answer)) = answer else { panic!("{answer:?}") };
+            let expected: BigRational = expected.parse().expect("a fraction");
+            assert!(encloses(&answer, &expected), "{question}: {answer:?}, not {expected}");
+            assert!(answer.upper - answer.lower <= 1e-9, "{question}: {answer:?}");
+        }
+    }
+}
+
 #[test]
 fn a_path_fails_where_an_evaluated_policy_has_no_choice() {
     let model = "mdp
