@@ -509,7 +509,7 @@ fn rewards_of_moves_with_similar_names_are_separate() {
 
 #[test]
 fn invalid_processes_are_refused() {
-    use pddl::ast::{InitialElement, Name, Problem as Pddl, Term};
+    use pddl::ast::{Condition, InitialElement, Name, Problem as Pddl, Term};
     let Setup { mission, roles, .. } =
         Setup::read(&root().join("missions/camara_like.toml")).expect("a mission");
     let (problem, _) = mission.filled().expect("filled");
@@ -549,6 +549,28 @@ fn invalid_processes_are_refused() {
         oversized.init.push(InitialElement::Fact(fact));
     }
     assert_eq!(codes(&oversized), ["M127"]);
+    // The process has one robot, and no further conditions of the goal.
+    let with_goal = |parts: Vec<Condition>| Pddl { goal: Condition::And(parts), ..problem.clone() };
+    let Condition::Atom(goal) = &problem.goal else { panic!("{:?}", problem.goal) };
+    let mut photo = goal.clone();
+    photo.predicate.name = Name::new("photographed");
+    let [goal, photo] = [goal.clone(), photo].map(Condition::Atom);
+    assert!(codes(&with_goal(vec![goal.clone()])).is_empty());
+    for parts in [vec![goal.clone(), photo.clone()], vec![photo.clone(), goal], vec![photo]] {
+        assert_eq!(codes(&with_goal(parts)), ["M127"]);
+    }
+    for predicate in ["robot_at", "configured"] {
+        let mut two_facts = problem.clone();
+        let fact = problem.init.iter().find_map(|element| match element {
+            InitialElement::Fact(atom) if atom.predicate.name.as_str() == predicate => Some(atom),
+            _ => None,
+        });
+        let mut fact = fact.unwrap_or_else(|| panic!("no {predicate}")).clone();
+        let (Term::Constant(object) | Term::Variable(object)) = &mut fact.arguments[0];
+        object.name = Name::new("another");
+        two_facts.init.push(InitialElement::Fact(fact));
+        assert_eq!(codes(&two_facts), ["M127"], "{predicate}");
+    }
 }
 
 #[test]
