@@ -92,7 +92,11 @@ pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
     let mut rows = begun_rows(pair, &comparison.candidates);
     let [time, energy] = comparison.hindsight;
     let bound = |measure: &str| match measure {
-        "time" | "penalised_time" => time.expected,
+        "time" => time.expected,
+        // A mission that does not reach the goal costs at least the penalty.
+        "penalised_time" => {
+            Some(time.expected.map_or(comparison.penalty, |expected| expected.min(comparison.penalty)))
+        }
         "energy" => energy.expected,
         "time_if_successful" => time.least,
         "energy_if_successful" => energy.least,

@@ -29,7 +29,7 @@ pub fn as_text(report: &Report, verbose: bool) -> String {
                 Answer::Undefined => {
                     " (not proved in floating-point arithmetic; `--exact` proves it if its budget suffices)"
                 }
-                _ => " (perhaps not the least)",
+                _ => " (perhaps not the best)",
             };
             format!("randomised: {}\ndeterministic: {}{note}\n", shown(randomised), shown(deterministic))
         }

@@ -264,13 +264,27 @@ impl Coadaptation {
         };
         let start = need(&roles.location, facts.single(&roles.location));
         let configured = need(&roles.configured, facts.single(&roles.configured));
-        let goal = need(&format!("{} as goal", roles.location), goal(&problem.goal, &roles.location));
         if facts.of(&roles.suits).is_empty() {
             need(&roles.suits, None);
         }
-        if !problems.is_empty() {
-            return Err(problems.into());
+        for role in [&roles.location, &roles.configured] {
+            if facts.of(role).iter().collect::<BTreeSet<_>>().len() > 1 {
+                let text = format!(
+                    "the problem has several facts `({role} …)` at the start; a process of places has one robot and one \
+                     configuration"
+                );
+                problems.push(Message::error("M127", text));
+            }
         }
+        let goal = goal(&problem.goal, &roles.location);
+        if goal.is_none() {
+            let text = format!(
+                "the goal of a process of places is a single fact `({} PLACE)`, without other conditions",
+                roles.location
+            );
+            problems.push(Message::error("M127", text));
+        }
+        let Some(goal) = goal.filter(|_| problems.is_empty()) else { return Err(problems.into()) };
         let mut places: Vec<String> = vec![start.clone(), goal.clone()];
         let mut designs: Vec<String> = vec![configured.clone()];
         for arguments in facts.of(&roles.suits) {
@@ -521,13 +535,17 @@ fn words(atom: &Atom) -> (String, Vec<String>) {
     (atom.predicate.name.as_str().to_ascii_lowercase(), atom.arguments.iter().map(argument).collect())
 }
 
+/// Returns the place of a goal that is a single fact `(location PLACE)`.
 fn goal(condition: &Condition, location: &str) -> Option<String> {
     match condition {
         Condition::Atom(atom) => {
             let (name, arguments) = words(atom);
             arguments.last().filter(|_| name == location.to_ascii_lowercase()).cloned()
         }
-        Condition::And(parts) => parts.iter().find_map(|part| goal(part, location)),
+        Condition::And(parts) => match &parts[..] {
+            [part] => goal(part, location),
+            _ => None,
+        },
         _ => None,
     }
 }

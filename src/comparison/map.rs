@@ -173,8 +173,59 @@ impl<'t> Map<'t> {
         if !self.unsafe_rectangles.is_empty() {
             warn("the rectangles in `unsafe-rects` are ignored; robots follow the arcs");
         }
+        if let Some(corridors) = listed(&self.one_ended()) {
+            warn(&format!(
+                "{corridors}: only one end lists the other; robots are assumed to move in both directions"
+            ));
+        }
+        if let Some(corridors) = listed(&self.ambiguous()) {
+            warn(&format!(
+                "{corridors}: several measurements differ; the last one is used, in both directions"
+            ));
+        }
         warnings
     }
+
+    /// Returns the corridors of which only one end lists the other one.
+    fn one_ended(&self) -> BTreeSet<(&str, &str)> {
+        let ends = self
+            .nodes
+            .iter()
+            .flat_map(|node| node.neighbours.iter().map(|next| (node.id.text.as_str(), next.text.as_str())));
+        let ends: BTreeSet<(&str, &str)> = ends.collect();
+        ends.iter().copied().filter(|(from, to)| !ends.contains(&(*to, *from))).collect()
+    }
+
+    /// Returns the corridors with different measurements of the same quantity, for example in the two directions.
+    fn ambiguous(&self) -> BTreeSet<(&str, &str)> {
+        let mut ambiguous = BTreeSet::new();
+        let lists = [(&self.time, "mean"), (&self.hitrate, "hitrate"), (&self.successrate, "successrate")];
+        for (list, field) in lists {
+            let mut values: BTreeMap<((&str, &str), &str), f64> = BTreeMap::new();
+            for Measured { from, to, entry, .. } in list {
+                let corridor = if from <= to { (&from[..], &to[..]) } else { (&to[..], &from[..]) };
+                for (design, measurement) in entry.as_object().into_iter().flatten() {
+                    let Some(value) = measurement[field].as_f64() else { continue };
+                    let earlier = values.insert((corridor, design), value);
+                    if earlier.is_some_and(|earlier| (earlier - value).abs() > 0.0) {
+                        ambiguous.insert(corridor);
+                    }
+                }
+            }
+        }
+        ambiguous
+    }
+}
+
+/// Greatest number of corridors that a warning lists.
+const MAX_LISTED: usize = 5;
+
+/// Lists corridors for a warning. `None` if there are none.
+fn listed(corridors: &BTreeSet<(&str, &str)>) -> Option<String> {
+    let names = corridors.iter().take(MAX_LISTED).map(|(from, to)| format!("`{from}`-`{to}`"));
+    let names: Vec<String> = names.collect();
+    let ellipsis = if corridors.len() > MAX_LISTED { ", …" } else { "" };
+    (!names.is_empty()).then(|| format!("{}{ellipsis}", names.join(", ")))
 }
 
 /// Converts the name of a place or design to a PDDL name: lower case, with `_` in place of each character that

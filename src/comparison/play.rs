@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use fixedbitset::FixedBitSet;
 use probabilistic::explore::{Bounds, Choices, Explored, Generator, explore};
 use probabilistic::policy::conditioned;
-use probabilistic::solve::solve;
+use probabilistic::solve::{Solution, solve};
 use probabilistic::{Direction, Error, Mdp, Number, Problem};
 
 use crate::comparison::process::{Process, State};
@@ -84,7 +84,8 @@ pub struct Measures {
     pub states: usize,
 }
 
-/// Evaluates a decision rule. `process` must have all rewards of `REWARDS`. With `counts`, steps are counted, so that
+/// Evaluates a decision rule, in doubles if its values cannot be computed within the budget of exact arithmetic. `process`
+/// must have all rewards of `REWARDS`. With `counts`, steps are counted, so that
 /// decisions can depend on their number. `penalty` is the time added if a mission does not reach the goal. `reserve` is
 /// the battery level for [`Measures::goal_with_reserve`]. `replans` is called after all decisions are made, and returns
 /// `true` for states in which a new plan was needed.
@@ -98,25 +99,38 @@ pub fn play<N: Number>(
 ) -> Result<Measures, Error> {
     let played = FixedProcess { process, decide: RefCell::new(decide), counts };
     let chain = explore(&played, &Bounds::default())?;
-    Ok(measure(process, &chain, penalty, reserve, replans))
+    let is_goal = |state: State| process.is_goal(state);
+    if let Some(measures) = measure(&is_goal, &chain, penalty, reserve, replans) {
+        return Ok(measures);
+    }
+    let doubles = |values: &Vec<N>| values.iter().map(Number::to_f64).collect();
+    let rewards: Vec<Vec<f64>> = chain.rewards.iter().map(doubles).collect();
+    let Explored { mdp, starts, states, deadlocks, .. } = chain;
+    let rounded = Explored { mdp: mdp.to_f64(), starts, states, rewards, deadlocks };
+    let interrupted = Error::Interrupted { states: rounded.mdp.states() };
+    measure(&is_goal, &rounded, penalty, reserve, replans).ok_or(interrupted)
 }
 
+/// Greatest width of the bounds on a value in doubles, relative to the value if it is above 1.
+const MAX_WIDTH: f64 = 1e-6;
+
+/// Returns `None` if exact arithmetic exceeds its budget, or if the bounds on a value are wider than [`MAX_WIDTH`].
 fn measure<N: Number>(
-    process: &Process<N>,
+    is_goal: &dyn Fn(State) -> bool,
     chain: &Explored<(State, u32), N>,
     penalty: f64,
     reserve: u32,
     replans: &dyn Fn(State) -> bool,
-) -> Measures {
+) -> Option<Measures> {
     let n = chain.mdp.states();
     let set = |holds: &dyn Fn(State) -> bool| {
         let mut set = FixedBitSet::with_capacity(n);
         chain.states.iter().enumerate().for_each(|(number, (state, _))| set.set(number, holds(*state)));
         set
     };
-    let goal = set(&|state| process.is_goal(state));
-    let above_reserve = set(&|state| process.is_goal(state) && state.situation().battery >= reserve);
-    let safe_goal = set(&|state| process.is_goal(state) && !state.situation().hit);
+    let goal = set(is_goal);
+    let above_reserve = set(&|state| is_goal(state) && state.situation().battery >= reserve);
+    let safe_goal = set(&|state| is_goal(state) && !state.situation().hit);
     let hit = set(&|state| state.situation().hit);
     let mut end = FixedBitSet::with_capacity(n);
     for state in 0..n {
@@ -124,28 +138,33 @@ fn measure<N: Number>(
         let stays = chain.mdp.choices(state).all(|c| chain.mdp.action(c) == probabilistic::explore::DEADLOCK);
         end.set(state, stays);
     }
-    let value = |mdp: &Mdp<N>, rewards: Option<&[N]>, terminal: &FixedBitSet| {
-        solve(Problem::new(mdp, Direction::Max, rewards, terminal), None)
+    // State 0 is the initial state.
+    let is_narrow = |solution: &Solution<N>| {
+        solution.bounds(0).is_none_or(|(lower, upper)| upper - lower <= MAX_WIDTH * upper.max(1.0))
     };
+    let value = |mdp: &Mdp<N>, rewards: Option<&[N]>, terminal: &FixedBitSet| {
+        solve(Problem::new(mdp, Direction::Max, rewards, terminal), None).filter(is_narrow)
+    };
+    // The inner result is `None` if the value is infinite.
     let first = |rewards: Option<&[N]>, terminal: &FixedBitSet| {
         let solution = value(&chain.mdp, rewards, terminal)?;
-        // State 0 is the initial state.
-        (!solution.infinite.contains(0)).then(|| solution.values[0].to_f64())
+        Some((!solution.infinite.contains(0)).then(|| solution.values[0].to_f64()))
     };
-    let reached = value(&chain.mdp, None, &goal).map(|solution| solution.values).unwrap_or_default();
-    let success = reached.first().map_or(0.0, Number::to_f64);
+    let probability = |terminal: &FixedBitSet| Some(first(None, terminal)?.unwrap_or(0.0));
+    let reached = value(&chain.mdp, None, &goal)?.values;
+    let success = reached[0].to_f64();
     let policy: Vec<u32> = (0..n).map(|state| chain.mdp.choices(state).start as u32).collect();
     let if_successful = |reward: usize| {
         // A conditional expectation needs a condition of positive probability.
         if success <= 0.0 {
-            return None;
+            return Some(None);
         }
         // Conditioning on success reweights each transition by the success probability of its
         // target.
         let (mdp, origin) = conditioned(&chain.mdp, &policy, &reached, &goal);
         let rewards: Vec<N> = origin.iter().map(|c| chain.rewards[reward][*c as usize].clone()).collect();
         let solution = value(&mdp, Some(&rewards), &goal)?;
-        Some(solution.values[0].to_f64())
+        Some(Some(solution.values[0].to_f64()))
     };
     let sum = |reward: usize| first(Some(&chain.rewards[reward]), &end);
     let mut visits = vec![N::zero(); chain.mdp.choice_count()];
@@ -154,20 +173,76 @@ fn measure<N: Number>(
             chain.mdp.choices(number).for_each(|choice| visits[choice] = N::one());
         }
     }
-    let time = sum(0);
-    Measures {
+    let time = sum(0)?;
+    Some(Measures {
         goal: success,
-        goal_with_reserve: first(None, &above_reserve).unwrap_or(0.0),
-        goal_without_collision: first(None, &safe_goal).unwrap_or(0.0),
-        no_collision: 1.0 - first(None, &hit).unwrap_or(0.0),
-        collisions: sum(2).unwrap_or(f64::NAN),
+        goal_with_reserve: probability(&above_reserve)?,
+        goal_without_collision: probability(&safe_goal)?,
+        no_collision: 1.0 - probability(&hit)?,
+        collisions: sum(2)?.unwrap_or(f64::NAN),
         time,
-        energy: sum(1),
-        reconfigurations: sum(3),
-        time_if_successful: if_successful(0),
-        energy_if_successful: if_successful(1),
+        energy: sum(1)?,
+        reconfigurations: sum(3)?,
+        time_if_successful: if_successful(0)?,
+        energy_if_successful: if_successful(1)?,
         penalised_time: time.map(|time| time + penalty * (1.0 - success)),
-        replans: first(Some(&visits), &end).unwrap_or(f64::NAN),
+        replans: first(Some(&visits), &end)?.unwrap_or(f64::NAN),
         states: n,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+
+    use super::*;
+    use crate::comparison::coadaptation::{Arc, Coadaptation, Configuration, Traversal};
+    use crate::comparison::process::{Action, REWARDS, Risk};
+
+    /// The fractions of the values are so long that exact arithmetic exceeds its budget.
+    #[test]
+    fn long_plans_have_the_values_of_the_formulas() {
+        const MOVES: usize = 300;
+        let decimal = |text: &str| probabilistic::number::parse_decimal(text).expect("a decimal");
+        let traversal = Traversal {
+            time: BigRational::one(),
+            energy: BigRational::zero(),
+            success: decimal("0.987654321"),
+            hit: decimal("0.012345679"),
+        };
+        let arc = |from: usize| Arc { from, to: from + 1, by: vec![Some(traversal.clone())] };
+        let configuration = Configuration { name: "fd".to_owned(), components: Vec::new(), available: true };
+        let mission = Coadaptation {
+            places: (0..=MOVES).map(|place| format!("p{place}")).collect(),
+            start: 0,
+            goal: MOVES,
+            configurations: vec![configuration],
+            initial: 0,
+            arcs: (0..MOVES).map(arc).collect(),
+            switches: vec![vec![None]],
+            battery: None,
+            loss: None,
+        };
+        let process = Process::<BigRational>::new(&mission, Risk::all(&mission), &REWARDS);
+        let mut decide = |_: State, step: u32| Some(Action::Move(step as usize).number());
+        let measures = play(&process, true, 1000.0, 0, &|_| false, &mut decide).expect("measures");
+        // A move fails with probability 1 - s. Otherwise there is a collision with probability h.
+        let (s, h) = (0.987_654_321_f64, 0.012_345_679_f64);
+        let sum = |ratio: f64| (1.0 - ratio.powi(MOVES as i32)) / (1.0 - ratio);
+        let (success, safe) = (s.powi(MOVES as i32), (s * (1.0 - h)).powi(MOVES as i32));
+        let time = sum(s);
+        for (value, expected) in [
+            (Some(measures.goal), success),
+            (Some(measures.goal_with_reserve), success),
+            (Some(measures.goal_without_collision), safe),
+            (Some(measures.no_collision), safe + (1.0 - s) * sum(s * (1.0 - h))),
+            (Some(measures.collisions), s * h * time),
+            (measures.time, time),
+            (measures.time_if_successful, MOVES as f64),
+            (measures.penalised_time, time + 1000.0 * (1.0 - success)),
+        ] {
+            let value = value.expect("a number");
+            assert!((value - expected).abs() <= 1e-9 * expected, "{value}, not {expected}: {measures:?}");
+        }
     }
 }

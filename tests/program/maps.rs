@@ -64,6 +64,7 @@ fn maps_of_2017_become_missions() {
         "no measurements of time",
         "no probabilities",
         "the rectangles in `unsafe-rects` are ignored",
+        "`h4`-`c1`, `h4`-`h3`: only one end lists the other",
     ] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
@@ -96,6 +97,23 @@ fn both_map_formats_give_the_same_mission() {
     let energy = (6.8 * 0.68 * 17_790.0 * 0.01_f64).trunc();
     assert!(old.problem.contains(&format!("(= (energy h1 h2 fd_amcl_kinect) {energy})")), "{}", old.problem);
     assert!(old.problem.contains("(= (time h1 h2 fd_amcl_kinect) 10)"), "{}", old.problem);
+}
+
+#[test]
+fn different_measurements_of_a_corridor_are_a_warning() {
+    let options = MapOptions { start: "h1".to_owned(), goal: "h4".to_owned(), ..MapOptions::default() };
+    let warnings = |back: f64| {
+        let rates = format!(
+            "\"hitrate\": [{{\"from\": \"h1\", \"to\": \"h2\", \"aruco\": {{\"hitrate\": 0.5}}}},
+               {{\"from\": \"h2\", \"to\": \"h1\", \"aruco\": {{\"hitrate\": {back}}}}}],\n\"unsafe-rects\""
+        );
+        let text = map().replacen("\"unsafe-rects\"", &rates, 1);
+        let warnings = import_map("map", &text, &options).expect("a map").warnings;
+        warnings.iter().map(|warning| warning.message.clone()).collect::<Vec<_>>().join("\n")
+    };
+    let expected = "`h1`-`h2`: several measurements differ";
+    assert!(warnings(0.25).contains(expected), "{}", warnings(0.25));
+    assert!(!warnings(0.5).contains(expected), "{}", warnings(0.5));
 }
 
 #[test]

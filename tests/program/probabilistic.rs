@@ -403,6 +403,45 @@ fn a_failed_change_of_configuration_ends_a_plan_that_is_not_replanned() {
     }
 }
 
+/// Every policy pays 10 for the move to `b`, which succeeds with probability 1/2, and 90 for the move to `c`, or the
+/// penalty. No policy reaches `d`.
+#[test]
+fn the_bound_on_the_penalised_time_is_at_most_the_penalty() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).expect("written");
+    write(
+        "domain.pddl",
+        "(define (domain robot) (:requirements :typing :numeric-fluents)
+           (:types waypoint functiondesign)
+           (:predicates (robot_at ?at - waypoint) (configured ?fd - functiondesign)
+             (fd_available ?fd - functiondesign) (suits ?fd - functiondesign ?from ?to - waypoint))
+           (:functions (time ?from ?to - waypoint ?fd - functiondesign)
+             (success ?from ?to - waypoint ?fd - functiondesign) (total_time))
+           (:action move :parameters (?fd - functiondesign ?from ?to - waypoint)
+             :precondition (and (robot_at ?from) (configured ?fd) (fd_available ?fd) (suits ?fd ?from ?to))
+             :effect (and (not (robot_at ?from)) (robot_at ?to) (increase (total_time) (time ?from ?to ?fd)))))",
+    );
+    let problem = "(define (problem p) (:domain robot)
+           (:objects a b c d - waypoint fd - functiondesign)
+           (:init (robot_at a) (configured fd) (fd_available fd) (= (total_time) 0)
+             (suits fd a b) (= (time a b fd) 10) (= (success a b fd) 0.5) (suits fd b c) (= (time b c fd) 90))
+           (:goal (robot_at GOAL)) (:metric minimize (total_time)))";
+    for (goal, time, open_loop) in [("c", Some(100.0), Some(57.5)), ("d", None, None)] {
+        write("problem.pddl", &problem.replace("GOAL", goal));
+        let arguments = ["compare", "domain.pddl", "problem.pddl", "--penalty", "5", "--format", "json"];
+        let outcome = metaplan_in(directory.path(), &arguments, "");
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+        let answer = outcome.json()["comparisons"][0].clone();
+        let candidates = answer["candidates"].as_array().expect("candidates");
+        let of = |kind: &str, measure: &str| {
+            candidates.iter().find(|candidate| candidate["kind"] == kind)?[measure].as_f64()
+        };
+        assert_eq!(of("f", "time"), time, "{answer:#}");
+        assert_eq!(of("f", "penalised_time"), Some(5.0), "{answer:#}");
+        assert_eq!(of("b", "penalised_time"), open_loop, "{answer:#}");
+    }
+}
+
 #[test]
 fn missions_whose_goal_holds_already_are_compared() {
     for file in ["missions/ugv.toml", "missions/ugv_plain.toml"] {
@@ -470,7 +509,7 @@ fn rewards_of_moves_with_similar_names_are_separate() {
 
 #[test]
 fn invalid_processes_are_refused() {
-    use pddl::ast::{InitialElement, Name, Problem as Pddl, Term};
+    use pddl::ast::{Condition, InitialElement, Name, Problem as Pddl, Term};
     let Setup { mission, roles, .. } =
         Setup::read(&root().join("missions/camara_like.toml")).expect("a mission");
     let (problem, _) = mission.filled().expect("filled");
@@ -510,6 +549,28 @@ fn invalid_processes_are_refused() {
         oversized.init.push(InitialElement::Fact(fact));
     }
     assert_eq!(codes(&oversized), ["M127"]);
+    // The process has one robot, and no further conditions of the goal.
+    let with_goal = |parts: Vec<Condition>| Pddl { goal: Condition::And(parts), ..problem.clone() };
+    let Condition::Atom(goal) = &problem.goal else { panic!("{:?}", problem.goal) };
+    let mut photo = goal.clone();
+    photo.predicate.name = Name::new("photographed");
+    let [goal, photo] = [goal.clone(), photo].map(Condition::Atom);
+    assert!(codes(&with_goal(vec![goal.clone()])).is_empty());
+    for parts in [vec![goal.clone(), photo.clone()], vec![photo.clone(), goal], vec![photo]] {
+        assert_eq!(codes(&with_goal(parts)), ["M127"]);
+    }
+    for predicate in ["robot_at", "configured"] {
+        let mut two_facts = problem.clone();
+        let fact = problem.init.iter().find_map(|element| match element {
+            InitialElement::Fact(atom) if atom.predicate.name.as_str() == predicate => Some(atom),
+            _ => None,
+        });
+        let mut fact = fact.unwrap_or_else(|| panic!("no {predicate}")).clone();
+        let (Term::Constant(object) | Term::Variable(object)) = &mut fact.arguments[0];
+        object.name = Name::new("another");
+        two_facts.init.push(InitialElement::Fact(fact));
+        assert_eq!(codes(&two_facts), ["M127"], "{predicate}");
+    }
 }
 
 #[test]

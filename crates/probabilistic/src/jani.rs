@@ -2,8 +2,8 @@
 //!
 //! Each module becomes an automaton with a single location. Automata synchronise on their common
 //! actions. Labels become transient Boolean variables; reward structures become transient real
-//! variables. Formulas are expanded; names of labels and reward structures that collide with other
-//! names get a prefix.
+//! variables. Formulas, and labels in expressions, are expanded; names of labels and reward
+//! structures that collide with other names get a prefix.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -354,22 +354,9 @@ impl Writer<'_> {
             ExprKind::Bool(value) => json!(value),
             ExprKind::Int(value) => json!(value),
             ExprKind::Number(value) => number(value),
-            ExprKind::Label(name) => json!(name),
-            ExprKind::Name(name) => match self.model.formulas.iter().find(|formula| formula.name == *name) {
-                Some(formula) => {
-                    let (depth, levels) = self.open.get();
-                    let nested = levels.saturating_add(formula.expression.levels());
-                    if depth >= MAX_DEPTH || nested > MAX_LEVELS {
-                        self.remaining.set(0);
-                        return Value::Null;
-                    }
-                    self.open.set((depth.saturating_add(1), nested));
-                    let value = self.expression(&formula.expression);
-                    self.open.set((depth, levels));
-                    value
-                }
-                None => json!(name),
-            },
+            // Labels are expanded, too: while the transient variables are assigned, they still have their old values.
+            ExprKind::Label(name) => self.definition(&self.model.labels, name),
+            ExprKind::Name(name) => self.definition(&self.model.formulas, name),
             ExprKind::Not(inner) => object([("op", "¬".into()), ("exp", self.expression(inner))]),
             ExprKind::Negative(inner) => binary("-", 0.into(), self.expression(inner)),
             ExprKind::Binary(op, left, right) => {
@@ -385,6 +372,23 @@ impl Writer<'_> {
             // Properties do not occur in models.
             ExprKind::Property(_) | ExprKind::Temporal(_) => json!(true),
         }
+    }
+
+    /// Expands the definition of `name` in `definitions`. Another name is written as it is.
+    fn definition(&self, definitions: &[Named], name: &str) -> Value {
+        let Some(definition) = definitions.iter().find(|definition| definition.name == name) else {
+            return json!(name);
+        };
+        let (depth, levels) = self.open.get();
+        let nested = levels.saturating_add(definition.expression.levels());
+        if depth >= MAX_DEPTH || nested > MAX_LEVELS {
+            self.remaining.set(0);
+            return Value::Null;
+        }
+        self.open.set((depth.saturating_add(1), nested));
+        let value = self.expression(&definition.expression);
+        self.open.set((depth, levels));
+        value
     }
 
     fn call(&self, function: Function, arguments: &[Expr]) -> Value {
@@ -430,13 +434,14 @@ fn number(value: &num_rational::BigRational) -> Value {
 
 fn sign(op: BinaryOp) -> &'static str {
     match op {
-        BinaryOp::Iff => "⇔",
         BinaryOp::Implies => "⇒",
         BinaryOp::Or => "∨",
         BinaryOp::And => "∧",
         BinaryOp::NotEqual => "≠",
         BinaryOp::LessEqual => "≤",
         BinaryOp::GreaterEqual => "≥",
+        // JANI has no operator for equivalence, but its equality also compares truth values.
+        BinaryOp::Iff => BinaryOp::Equal.sign().0,
         other => other.sign().0,
     }
 }

@@ -9,7 +9,7 @@ use num_rational::BigRational;
 
 use crate::error::Error;
 use crate::fraction::Fraction;
-use crate::number::Number;
+use crate::number::{Number, plus_with_error};
 
 /// Upper limit on the number of states and on the number of choices. The two greatest 32-bit
 /// numbers are reserved as markers.
@@ -35,6 +35,9 @@ pub struct Mdp<N> {
     actions: Vec<u32>,
     /// Positions of the targets of the current choice, if there are more than [`MAX_SCANNED`]; otherwise empty.
     positions: BTreeMap<u32, usize>,
+    /// For positions of the current choice, the error of the sum of several probabilities, which is added when the choice
+    /// ends (see [`plus_with_error`]).
+    sum_errors: BTreeMap<usize, N>,
 }
 
 /// Maximum number of targets of a choice that are compared one by one with each further target.
@@ -49,6 +52,7 @@ impl<N: Number> Default for Mdp<N> {
             probabilities: Vec::new(),
             actions: Vec::new(),
             positions: BTreeMap::new(),
+            sum_errors: BTreeMap::new(),
         }
     }
 }
@@ -139,7 +143,12 @@ impl<N: Number> Mdp<N> {
             at.map(|at| first + at)
         };
         if let Some(at) = position {
-            self.probabilities[at] = self.probabilities[at].plus(&probability);
+            let (sum, error) = plus_with_error(&self.probabilities[at], &probability);
+            self.probabilities[at] = sum;
+            if !error.is_zero() {
+                let total = self.sum_errors.entry(at).or_insert_with(N::zero);
+                *total = total.plus(&error);
+            }
             return;
         }
         self.targets.push(target);
@@ -164,6 +173,9 @@ impl<N: Number> Mdp<N> {
         self.actions.push(action);
         self.first_transition.push(end);
         self.positions.clear();
+        while let Some((at, error)) = self.sum_errors.pop_first() {
+            self.probabilities[at] = self.probabilities[at].plus(&error);
+        }
         Ok(())
     }
 
@@ -185,6 +197,7 @@ impl<N: Number> Mdp<N> {
             probabilities: self.probabilities.iter().map(Number::to_f64).collect(),
             actions: self.actions.clone(),
             positions: BTreeMap::new(),
+            sum_errors: BTreeMap::new(),
         }
     }
 }
@@ -200,6 +213,7 @@ impl Mdp<Fraction> {
             probabilities: self.probabilities.iter().map(Fraction::rounded).collect::<Option<_>>()?,
             actions: self.actions.clone(),
             positions: BTreeMap::new(),
+            sum_errors: BTreeMap::new(),
         })
     }
 }

@@ -23,12 +23,62 @@ pub(crate) fn is_whole(value: f64) -> bool {
 /// double unless both rewards are: if it is, the next greater double is returned instead. In exact arithmetic, returns
 /// the sum.
 pub(crate) fn sum_of_rewards<N: Number>(left: &N, right: &N) -> N {
-    let sum = left.plus(right);
-    let [left, right, double] = [left, right, &sum].map(Number::to_f64);
-    if N::EXACT || !is_whole(double) || is_whole(left) && is_whole(right) {
-        return sum;
+    let mut sum = RewardSum::new(left.clone());
+    sum.add(right);
+    sum.total()
+}
+
+/// A sum of any number of rewards, each at least 0. In doubles, the rounding errors of the additions are summed, too, so
+/// that the relative error of the sum does not grow with their number (see [`plus_with_error`]). The sum is an integer
+/// below 4·10^15 only if all rewards are, as in [`sum_of_rewards`].
+pub(crate) struct RewardSum<N> {
+    sum: N,
+    error: N,
+    all_whole: bool,
+}
+
+impl<N: Number> RewardSum<N> {
+    pub fn new(first: N) -> Self {
+        let all_whole = N::EXACT || is_whole(first.to_f64());
+        Self { sum: first, error: N::zero(), all_whole }
     }
-    N::from_f64(double.next_up())
+
+    pub fn add(&mut self, reward: &N) {
+        let (sum, error) = plus_with_error(&self.sum, reward);
+        self.sum = sum;
+        if !N::EXACT {
+            self.error = self.error.plus(&error);
+            self.all_whole &= is_whole(reward.to_f64());
+        }
+    }
+
+    pub fn total(self) -> N {
+        if N::EXACT {
+            return self.sum;
+        }
+        let total = self.sum.plus(&self.error);
+        if self.all_whole || !is_whole(total.to_f64()) {
+            total
+        } else {
+            N::from_f64(total.to_f64().next_up())
+        }
+    }
+}
+
+/// Returns the sum and the rounding error that has to be added to it to get the exact sum; 0 in exact arithmetic (two-sum
+/// algorithm). If the errors of all additions of n nonnegative doubles are summed and added at the end, the relative error
+/// of the result is at most u + n²u², where u is the unit roundoff.
+///
+/// Reference: Ogita, Rump and Oishi, "Accurate Sum and Dot Product", SIAM Journal on Scientific Computing 26(6), 2005.
+pub(crate) fn plus_with_error<N: Number>(left: &N, right: &N) -> (N, N) {
+    let sum = left.plus(right);
+    if N::EXACT {
+        return (sum, N::zero());
+    }
+    let right_part = sum.minus(left);
+    let left_error = left.minus(&sum.minus(&right_part));
+    let error = left_error.plus(&right.minus(&right_part));
+    (sum, error)
 }
 
 #[expect(

@@ -18,11 +18,27 @@ pub struct States<S> {
     numbers: Numbers,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 enum Numbers {
     /// For each state code, the number of the state plus one, or 0 if the state was not inserted.
     Table(Vec<u32>),
     Hash(HashTable),
+}
+
+impl Clone for Numbers {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Table(table) => {
+                // Zeros are not written, because the system provides memory for the written parts of a table only.
+                let mut copy = vec![0; table.len()];
+                for (slot, number) in copy.iter_mut().zip(table).filter(|(_, number)| **number != 0) {
+                    *slot = *number;
+                }
+                Self::Table(copy)
+            }
+            Self::Hash(hash_table) => Self::Hash(hash_table.clone()),
+        }
+    }
 }
 
 /// A hash table with linear probing. The upper half of an entry is the hash of a state; the lower
@@ -217,5 +233,35 @@ impl<'a, S: Eq + Hash> IntoIterator for &'a States<S> {
 
     fn into_iter(self) -> Self::IntoIter {
         self.iter()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the resident memory of this process in pages, if the system reports it.
+    fn resident() -> Option<u64> {
+        let statistics = std::fs::read_to_string("/proc/self/statm").ok()?;
+        statistics.split_whitespace().nth(1)?.parse().ok()
+    }
+
+    #[test]
+    fn copies_of_sparse_tables_use_little_memory() {
+        let mut states = States::new(Some(1 << 26));
+        for state in [7_usize, 1 << 20, (1 << 26) - 1] {
+            let probe = states.probe(&state, |state| *state);
+            states.insert(state, probe);
+        }
+        let before = resident();
+        let copy = states.clone();
+        if let (Some(before), Some(after)) = (before, resident()) {
+            // The table has 65,536 pages of 4 kB.
+            assert!(after.saturating_sub(before) < 30_000, "from {before} to {after} pages");
+        }
+        for (number, state) in copy.iter().enumerate() {
+            assert_eq!(copy.number(*state, state), Some(number));
+        }
+        assert_eq!(copy.number(8, &8), None);
     }
 }

@@ -154,6 +154,54 @@ fn rewards_with_an_integral_sum_in_doubles_are_enclosed() {
     enclosed(&cycle, "Rmin=? [ F s=2 ]");
 }
 
+/// The sums of 400 equal probabilities or shares of a reward, and of 100 equal rewards, would be too small if each addition
+/// were rounded.
+#[test]
+fn sums_of_many_summands_are_enclosed() {
+    let commands = "[t] true -> true;".repeat(20);
+    let synchronised = format!(
+        "dtmc module a {commands} endmodule module b {commands} endmodule
+         module m s:[0..1] init 0; [t] s=0 -> (s'=1); endmodule
+         rewards \"n\" [t] true : 1; endrewards"
+    );
+    let single = format!(
+        "dtmc module m s:[0..1] init 0; {} endmodule rewards \"n\" [t] true : 1; endrewards",
+        "[t] s=0 -> (s'=1);".repeat(400)
+    );
+    for model in [&synchronised, &single] {
+        for question in ["P=? [ F<=1 s=1 ]", "P=? [ X s=1 ]", "R{\"n\"}=? [ F s=1 ]", "R{\"n\"}=? [ C<=1 ]"] {
+            assert_eq!(enclosed(model, question).to_string(), "1", "{question}");
+            let bound = question.replacen("=?", ">=1", 1);
+            let options = Options::default().with_exactness(Exactness::Never);
+            let refuted = matches!(outcome(model, &bound, &options), Ok(Outcome::Truth(false, _)));
+            assert!(!refuted, "{bound}");
+        }
+    }
+    let items = "true : 0.1;".repeat(100);
+    let rewards =
+        format!("mdp module m s:[0..1] init 0; [] true -> (s'=1-s); endmodule rewards {items} endrewards");
+    for question in ["Rmin=? [ C<=1 ]", "Rmax=? [ F s=1 ]", "Rmin=? [ I=1 ]"] {
+        assert_eq!(enclosed(&rewards, question).to_string(), "10", "{question}");
+    }
+}
+
+/// The exact values are 1e-400.
+#[test]
+fn products_and_quotients_below_the_least_double_are_enclosed() {
+    let model = "dtmc
+        module m s:[0..2] init 0; [] s=0 -> 1e-200:(s'=1) + 1-1e-200:(s'=2); [] s>0 -> true; endmodule";
+    for question in ["(P=? [ F s=1 ]) * (P=? [ F s=1 ])", "(P=? [ F s=1 ]) / 1e200"] {
+        assert_ne!(enclosed(model, question), BigRational::default(), "{question}");
+        let options = Options::default().with_exactness(Exactness::Never);
+        let refuted =
+            matches!(outcome(model, &format!("{question} > 0"), &options), Ok(Outcome::Truth(false, _)));
+        assert!(!refuted, "{question}");
+    }
+    // A product with an exact 0 is exactly 0.
+    let zero = value(model, "(P=? [ F s=1 ]) * (P=? [ G s=1 ])", Exactness::Never);
+    assert_eq!([zero.lower, zero.upper].map(f64::to_bits), [0.0, 0.0].map(f64::to_bits));
+}
+
 #[test]
 fn step_bounded_values_are_enclosed() {
     let model = "dtmc
@@ -247,6 +295,41 @@ fn a_policy_is_evaluated_over_bounded_steps() {
     let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
     let two_objectives = "multi(R{\"cost\"}min=? [ F \"goal\" ], Pmax=? [ F \"goal\" ])";
     assert!(outcome(model, two_objectives, &Options::default().with_evaluation(evaluate)).is_err());
+}
+
+/// With this policy, the only path visits the states 0 and 1 and ends after one step.
+#[test]
+fn a_path_that_has_ended_makes_no_further_steps() {
+    let model = "mdp
+        module m s:[0..1] init 0; [a] s=0 -> (s'=1); [b] s=1 -> (s'=0); endmodule
+        rewards \"r\" true : 1; endrewards
+        label \"goal\" = s=1;";
+    let policy = "{\"format\": \"metaplan-policy/1\", \"states\": [{\"state\": {\"s\": 0}, \"action\": \"a\", \"choice\": 0}]}";
+    let without_states = "{\"format\": \"metaplan-policy/1\", \"states\": []}";
+    for (policy, question, expected) in [
+        (policy, "Pmax=? [ F[2,2] \"goal\" ]", "0"),
+        (policy, "Pmax=? [ F>=2 \"goal\" ]", "0"),
+        (policy, "Pmax=? [ F[1,2] \"goal\" ]", "1"),
+        (policy, "Pmax=? [ F<=2 \"goal\" ]", "1"),
+        (policy, "Pmin=? [ s=0 U[1,3] \"goal\" ]", "1"),
+        (policy, "Pmax=? [ G[2,2] s=0 ]", "1"),
+        (policy, "Pmax=? [ G[1,2] s=0 ]", "0"),
+        (policy, "R{\"r\"}max=? [ C<=3 ]", "1"),
+        (policy, "R{\"r\"}max=? [ I=1 ]", "1"),
+        (policy, "R{\"r\"}max=? [ I=2 ]", "0"),
+        (without_states, "Pmax=? [ X s=0 ]", "0"),
+        (without_states, "Pmin=? [ X s=0 ]", "0"),
+    ] {
+        for exactness in [Exactness::Always, Exactness::Never] {
+            let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
+            let options = Options::default().with_exactness(exactness).with_evaluation(evaluate);
+            let answer = outcome(model, question, &options).expect("an answer");
+            let Outcome::Value(Answer::Finite(answer)) = answer else { panic!("{answer:?}") };
+            let expected: BigRational = expected.parse().expect("a fraction");
+            assert!(encloses(&answer, &expected), "{question}: {answer:?}, not {expected}");
+            assert!(answer.upper - answer.lower <= 1e-9, "{question}: {answer:?}");
+        }
+    }
 }
 
 #[test]

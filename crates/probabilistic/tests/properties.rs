@@ -185,6 +185,21 @@ fn filters_aggregate_the_values_of_states() {
         let result = outcome(CHAIN, question, Exactness::Auto);
         assert!(matches!(result, Outcome::Truth(holds, _) if holds == expected), "{question}: {result:?}");
     }
+    // As in PRISM, the old syntax with a bound asks whether it holds in all states, and both words ask for the range.
+    for (bound, words, expected) in
+        [(">=0.2", "", true), (">=0.3", "", false), (">=0.2", "{min}", true), (">=0.3", "{max}", false)]
+    {
+        let question = format!("P{bound} [ F d=1 {{s<3}}{words} ]");
+        let result = outcome(CHAIN, &question, Exactness::Auto);
+        assert!(matches!(result, Outcome::Truth(holds, _) if holds == expected), "{question}: {result:?}");
+    }
+    for words in ["{min}{max}", "{max}{min}"] {
+        let result = outcome(CHAIN, &format!("P=? [ F d=1 {{s<3}}{words} ]"), Exactness::Auto);
+        let Outcome::Range(least, greatest) = result else { panic!("{words}: {result:?}") };
+        let exact =
+            [least, greatest].map(|answer| answer.quantity().and_then(|quantity| quantity.exact.clone()));
+        assert_eq!(exact.map(|exact| exact.expect("exact").to_string()), ["1/5", "2/5"], "{words}");
+    }
     let Outcome::States(states) = outcome(CHAIN, "filter(print, P=? [ F d=1 ])", Exactness::Auto) else {
         panic!("no states");
     };
@@ -423,6 +438,40 @@ fn fronts_of_probabilities_do_not_wait_for_ever() {
 }
 
 /// An improvement of a policy travels one state in a round, so that there are more than a thousand rounds.
+/// The choice `fast` takes 2 and hits with probability 1/2, `slow` takes 3 and never hits.
+#[test]
+fn bounds_of_two_objectives_need_the_right_operator() {
+    let model = "mdp
+        module m
+          s:[0..2] init 0;
+          [fast] s=0 -> 1/2:(s'=1) + 1/2:(s'=2);
+          [slow] s=0 -> (s'=2);
+          [on] s=1 -> (s'=2);
+        endmodule
+        rewards \"time\" [fast] true:1; [on] true:2; [slow] true:3; endrewards
+        label \"goal\" = s=2; label \"hit\" = s=1;";
+    let time = "R{\"time\"}min=? [ F \"goal\" ]";
+    for bound in ["Pmax<=0.1", "Pmax<0.1", "Pmax>0.1", "Pmin<=0.1", "Pmin>=0.1", "P<=0.1", "P>0.1"] {
+        let question = format!("multi({time}, {bound} [ F \"hit\" ])");
+        assert_eq!(error(model, &question).0, "Q403", "{question}");
+    }
+    for bound in ["Rmin>=3", "Rmin>3", "Rmin<3", "Rmax<=3", "R>=3", "R<3"] {
+        let bound = bound.replacen('R', "R{\"time\"}", 1);
+        let question = format!("multi(Pmax=? [ F \"hit\" ], {bound} [ F \"goal\" ])");
+        assert_eq!(error(model, &question).0, "Q403", "{question}");
+    }
+    for (question, expected) in [
+        (format!("multi({time}, Pmax>=0.1 [ F \"hit\" ])"), "2"),
+        (format!("multi({time}, P>=0.1 [ F \"hit\" ])"), "2"),
+        ("multi(Pmax=? [ F \"hit\" ], R{\"time\"}min<=2.5 [ F \"goal\" ])".to_owned(), "1/2"),
+    ] {
+        let result = outcome(model, &question, Exactness::Always);
+        let Outcome::Constrained { deterministic, .. } = result else { panic!("{question}: {result:?}") };
+        let exact = deterministic.quantity().and_then(|quantity| quantity.exact.clone());
+        assert_eq!(exact.map(|exact| exact.to_string()).as_deref(), Some(expected), "{question}");
+    }
+}
+
 #[test]
 fn exact_policy_iteration_ends_at_the_optimum() {
     let model = "mdp module m s:[0..1200] init 0;

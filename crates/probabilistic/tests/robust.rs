@@ -146,7 +146,8 @@ fn recursive_formulas_are_rejected() {
 #[test]
 fn a_long_chain_of_formulas_is_refused_at_once() {
     let links = (1..20_000).map(|link| format!("formula f{link} = f{} + s;", link - 1)).collect::<String>();
-    let text = format!("mdp formula f0 = s; {links} module m s:[0..1] init 0; [] f19999 = 0 -> (s'=1); endmodule");
+    let text =
+        format!("mdp formula f0 = s; {links} module m s:[0..1] init 0; [] f19999 = 0 -> (s'=1); endmodule");
     let problems = jani::write("m", &prism::parse(&text).expect("a model")).expect_err("refused");
     assert!(problems.to_string().contains("nested too deeply"), "{problems}");
 }
@@ -286,6 +287,25 @@ fn jani_has_the_initial_states_of_the_model() {
     let jani = jani::write("m", &prism::parse(&without).expect("a model")).expect("JANI");
     assert!(jani.get("restrict-initial").is_none(), "{jani}");
     assert_eq!(jani["variables"][0]["initial-value"], 0);
+}
+
+#[test]
+fn labels_in_jani_are_expanded_and_truth_values_are_compared() {
+    let model = "dtmc
+        module m x:[0..2] init 0; y:[0..1] init 0; [] x<2 -> (x'=x+1); endmodule
+        label \"x\" = x=2; label \"both\" = \"x\" & y=1; label \"equal\" = x=1 <=> y=1;";
+    let jani = jani::write("m", &prism::parse(model).expect("a model")).expect("JANI");
+    let values = jani["automata"][0]["locations"][0]["transient-values"].as_array().expect("values");
+    let value = |name: &str| {
+        let assignment = values.iter().find(|assignment| assignment["ref"] == name);
+        assignment.unwrap_or_else(|| panic!("no {name}: {jani}"))["value"].clone()
+    };
+    let equal = |name: &str, number: i64| serde_json::json!({ "op": "=", "left": name, "right": number });
+    let binary = |op: &str, left: &str, number: i64| serde_json::json!({ "op": op, "left": equal(left, number), "right": equal("y", 1) });
+    assert_eq!(value("both"), binary("\u{2227}", "x", 2));
+    assert_eq!(value("equal"), binary("=", "x", 1));
+    let cyclic = model.replace("\"x\" = x=2", "\"x\" = \"both\"");
+    assert!(jani::write("m", &prism::parse(&cyclic).expect("a model")).is_err());
 }
 
 /// Exploration of these models ends at once, so only the computation of the values can be cancelled.

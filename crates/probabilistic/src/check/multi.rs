@@ -6,7 +6,7 @@ use crate::check::query::Query;
 use crate::error::Place;
 use crate::number::Number;
 use crate::pareto::{Bounded, Objective, Optimum, Pareto};
-use crate::prism::ast::{BinaryOp, Expr, ExprKind, Path, Property, RewardPath};
+use crate::prism::ast::{BinaryOp, ExprKind, Path, Property, Question, RewardPath};
 use crate::solve::Direction;
 
 impl<N: Number> Query<'_, N> {
@@ -18,8 +18,8 @@ impl<N: Number> Query<'_, N> {
             return Err(property_error("Q403", place, "`multi` is supported with two objectives").into());
         };
         // If one objective has a bound, it is placed second.
-        let (first, second) = if bound_of(first).is_some() { (second, first) } else { (first, second) };
-        if bound_of(first).is_some() {
+        let (first, second) = if first.bound().is_some() { (second, first) } else { (first, second) };
+        if first.bound().is_some() {
             return Err(property_error("Q403", place, "one objective of `multi` must ask for a value").into());
         }
         let objectives = [self.objective(first)?, self.objective(second)?];
@@ -36,7 +36,7 @@ impl<N: Number> Query<'_, N> {
             let answer = Answer::from_number(&value, error);
             if objectives[number].rewards.is_none() { answer.probability() } else { answer }
         };
-        if let Some((_, bound)) = bound_of(second) {
+        if let Some((_, bound)) = second.bound() {
             let bound = N::from_rational(&self.constant(bound)?);
             let limit = if objectives[1].rewards.is_some() { bound } else { N::one().minus(&bound) };
             let optimum = pareto.constrained(&limit);
@@ -65,9 +65,7 @@ impl<N: Number> Query<'_, N> {
         match property {
             Property::Reward(question, name, path) if reaches(path) => {
                 let RewardPath::Reach(goal) = path else { return refuse("only `F`") };
-                let least = question.direction == Some(Direction::Min)
-                    || matches!(question.bound, Some((BinaryOp::LessEqual, _)));
-                if !least {
+                if !asks(question, Direction::Min, BinaryOp::LessEqual) {
                     return refuse("rewards in `multi` are minimised, or bounded with `<=`");
                 }
                 let rewards = Some(self.rewards(name.as_deref())?.to_vec());
@@ -76,9 +74,7 @@ impl<N: Number> Query<'_, N> {
             Property::Probability(question, Path::Until(left, goal, None))
                 if left.kind == ExprKind::Bool(true) =>
             {
-                let greatest = question.direction == Some(Direction::Max)
-                    || matches!(question.bound, Some((BinaryOp::GreaterEqual, _)));
-                if !greatest {
+                if !asks(question, Direction::Max, BinaryOp::GreaterEqual) {
                     return refuse("probabilities in `multi` are maximised, or bounded with `>=`");
                 }
                 Ok(Objective { rewards: None, target: self.truth(goal)? })
@@ -88,10 +84,12 @@ impl<N: Number> Query<'_, N> {
     }
 }
 
-fn bound_of(property: &Property) -> Option<&(BinaryOp, Expr)> {
-    match property {
-        Property::Probability(question, _) | Property::Reward(question, ..) => question.bound.as_ref(),
-        _ => None,
+/// Returns `true` if a question asks for the optimum in `direction`, or has a bound with the operator `bound_op`, with or
+/// without this direction.
+fn asks(question: &Question, direction: Direction, bound_op: BinaryOp) -> bool {
+    match &question.bound {
+        None => question.direction == Some(direction),
+        Some((op, _)) => *op == bound_op && question.direction.is_none_or(|requested| requested == direction),
     }
 }
 

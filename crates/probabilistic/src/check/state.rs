@@ -5,6 +5,7 @@ use num_rational::BigRational;
 
 use crate::check::ask::{Checked, Stop, property_error, refusal};
 use crate::check::query::Query;
+use crate::check::steps::UNDERFLOW_THRESHOLD;
 use crate::check::vector::{Span, Vector};
 use crate::error::{Diagnostic, Error};
 use crate::explore::DEADLOCK;
@@ -70,11 +71,6 @@ pub fn with_placeholders(expression: &Expr, names: &Names) -> Expr {
         ExprKind::Label(label) if is_built_in(label, names) => {
             Some(Expr { kind: ExprKind::Bool(true), place: part.place })
         }
-        ExprKind::Label(label) => {
-            // Declared labels of a property file may refer to predefined labels.
-            let inner = names.label(label).filter(|inner| mentions_built_in(inner, names))?;
-            Some(with_placeholders(inner, names))
-        }
         _ => None,
     })
 }
@@ -96,16 +92,6 @@ pub fn is_of_states(expression: &Expr, names: &Names) -> bool {
         None
     });
     depends_on_variables_only
-}
-
-fn mentions_built_in(expression: &Expr, names: &Names) -> bool {
-    let mut is_mentioned = false;
-    let _ = expression.rewrite(&mut |part| {
-        is_mentioned |= matches!(&part.kind, ExprKind::Label(label) if is_built_in(label, names));
-        is_mentioned |= matches!(&part.kind, ExprKind::Property(_));
-        None
-    });
-    is_mentioned
 }
 
 impl<N: Number> Query<'_, N> {
@@ -169,11 +155,6 @@ impl<N: Number> Query<'_, N> {
             let set = match &part.kind {
                 ExprKind::Property(property) => self.property_truth(property),
                 ExprKind::Label(label) if is_built_in(label, &self.program.names) => Ok(self.built_in(label)),
-                ExprKind::Label(label) => {
-                    let names = &self.program.names;
-                    let inner = names.label(label).filter(|inner| mentions_built_in(inner, names))?.clone();
-                    return Some(self.with_sets(&inner, sets, stopped));
-                }
                 ExprKind::Binary(op, left, right)
                     if is_comparison(*op) && (is_numeric(left) || is_numeric(right)) =>
                 {
@@ -349,7 +330,14 @@ fn joined<N: Number>(
                 _ if f >= y => f64::INFINITY,
                 _ => (e + x / y * f) / (y - f),
             };
-            vector.errors.push((error + value.to_f64().abs() * f64::EPSILON) * (1.0 + 16.0 * f64::EPSILON));
+            // Products and quotients may underflow, with their errors, unless an operand is exactly 0.
+            let size = value.to_f64().abs();
+            let underflows = matches!(op, BinaryOp::Times | BinaryOp::Divide)
+                && size < UNDERFLOW_THRESHOLD
+                && x + e > 0.0
+                && y + f > 0.0;
+            let rounding = size * f64::EPSILON + if underflows { UNDERFLOW_THRESHOLD } else { 0.0 };
+            vector.errors.push((error + rounding) * (1.0 + 16.0 * f64::EPSILON));
         }
         vector.values.push(value);
     }

@@ -5,7 +5,7 @@ use crate::solve::{Direction, Problem, Work};
 
 /// Underflow threshold: positive products below this value may lose relative precision. The absolute error caused by
 /// such a loss is less than the threshold.
-const UNDERFLOW_THRESHOLD: f64 = 1e-280;
+pub const UNDERFLOW_THRESHOLD: f64 = 1e-280;
 
 pub struct Stepped<N> {
     pub values: Vec<N>,
@@ -23,8 +23,8 @@ impl<N: Number> Stepped<N> {
 }
 
 /// Applies the Bellman operator `steps` times, starting with `values`. The values of terminal and
-/// blocked states do not change. Returns `None` if exact arithmetic exceeds its budget, or if the caller has
-/// cancelled the computation.
+/// blocked states do not change. In another state without an allowed choice, a path ends, so the value of a further step
+/// is 0. Returns `None` if exact arithmetic exceeds its budget, or if the caller has cancelled the computation.
 ///
 /// All operands are nonnegative, so each step increases the relative error of a value by a
 /// bounded amount.
@@ -62,9 +62,7 @@ pub fn apply<N: Number>(
                     best = Some(value);
                 }
             }
-            if let Some(best) = best {
-                next[state] = best;
-            }
+            next[state] = best.unwrap_or_else(N::zero);
         }
         let settled = next == values;
         values = next;

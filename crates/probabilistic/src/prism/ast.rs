@@ -64,6 +64,19 @@ pub enum Property {
     Refused(Diagnostic),
 }
 
+impl Property {
+    /// Returns the operator and the limit of the bound of a `P`, `R` or `S` operator. `None` if it has no bound, and for
+    /// other properties.
+    pub fn bound(&self) -> Option<&(BinaryOp, Expr)> {
+        match self {
+            Self::Probability(question, _) | Self::Reward(question, ..) | Self::SteadyState(question, _) => {
+                question.bound.as_ref()
+            }
+            _ => None,
+        }
+    }
+}
+
 /// The aggregate function of a filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the names are those of the operators")]

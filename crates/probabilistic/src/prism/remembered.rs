@@ -15,7 +15,7 @@ use smallvec::SmallVec;
 use crate::error::Error;
 use crate::explore::{Choices, Generator};
 use crate::mdp::dense;
-use crate::number::{Number, sum_of_rewards};
+use crate::number::{Number, RewardSum, sum_of_rewards};
 use crate::prism::ast::ModelKind;
 use crate::prism::behaviour::{Chosen, MAX_ACTIONS, Module};
 use crate::prism::command::RewardItem;
@@ -196,19 +196,21 @@ impl<N: Number> Memory<N> {
         let share = |number: &N| count.as_ref().map_or_else(|| number.clone(), |count| number.over(count));
         let sums_of_state =
             state_sums.get(state, || program.state_rewards(&program.values_of(state)).ok())?;
-        let mut total = sums_of_state.clone();
+        let mut totals: SmallVec<[RewardSum<N>; 4]> =
+            sums_of_state.iter().cloned().map(RewardSum::new).collect();
         team.each_action(|action, parts| {
             let reward = action_sums_cache.get(program, action, state)?;
             team.each_combination(parts, |chosen| {
-                for (sum, reward) in total.iter_mut().zip(reward) {
-                    *sum = sum_of_rewards(sum, &share(reward));
+                for (total, reward) in totals.iter_mut().zip(reward) {
+                    total.add(&share(reward));
                 }
                 combiner.combine(team, state, parts, chosen, |next, probability| {
                     choices.to(next, share(&probability));
                 });
             })
         })?;
-        choices.end(if combinations == 1 { last_action } else { UNNAMED }, total);
+        let action = if combinations == 1 { last_action } else { UNNAMED };
+        choices.end(action, totals.into_iter().map(RewardSum::total));
         Some(())
     }
 }

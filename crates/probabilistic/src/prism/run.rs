@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 use crate::error::{Diagnostic, Error, Place};
 use crate::explore::{Choices, Generator};
 use crate::mdp::dense;
-use crate::number::{Number, sum_of_rewards};
+use crate::number::{Number, RewardSum, sum_of_rewards};
 use crate::prism::ast::ModelKind;
 use crate::prism::code::{Code, Fault, rounded};
 use crate::prism::command::{Command, RewardItem, Variable};
@@ -356,18 +356,20 @@ impl<N: Number> Program<N> {
         let count =
             (combinations > 1).then(|| N::from_rational(&BigRational::from(BigInt::from(combinations))));
         let share = |number: &N| count.as_ref().map_or_else(|| number.clone(), |count| number.over(count));
-        let mut total = self.state_rewards(values)?;
+        let mut totals: SmallVec<[RewardSum<N>; 4]> =
+            self.state_rewards(values)?.into_iter().map(RewardSum::new).collect();
         for joint in &joint_steps {
             let rewards = self.action_rewards(joint.action, values)?;
             joint.each(|chosen| {
-                for (sum, reward) in total.iter_mut().zip(&rewards) {
-                    *sum = sum_of_rewards(sum, &share(reward));
+                for (total, reward) in totals.iter_mut().zip(&rewards) {
+                    total.add(&share(reward));
                 }
                 self.expand(state, joint, chosen, |next, probability| choices.to(next, share(&probability)));
                 Ok::<(), Error>(())
             })?;
         }
-        choices.end(if combinations == 1 { joint_steps[0].action } else { UNNAMED }, total);
+        let action = if combinations == 1 { joint_steps[0].action } else { UNNAMED };
+        choices.end(action, totals.into_iter().map(RewardSum::total));
         Ok(())
     }
 }
@@ -420,12 +422,12 @@ fn at(Fault(text): Fault, place: Place) -> Error {
 }
 
 fn sum<N: Number>(items: &[RewardItem<N>], values: &[i64]) -> Result<N, Error> {
-    let mut sum = N::zero();
+    let mut sum = RewardSum::new(N::zero());
     for item in items {
         let fault = |fault| at(fault, item.place);
         if item.guard.holds(values).map_err(fault)? {
             if let Some(reward) = &item.certain {
-                sum = sum_of_rewards(&sum, reward);
+                sum.add(reward);
                 continue;
             }
             let reward = item.reward.number(values).map_err(fault)?;
@@ -433,8 +435,8 @@ fn sum<N: Number>(items: &[RewardItem<N>], values: &[i64]) -> Result<N, Error> {
                 let text = format!("a negative reward, {}", Number::to_f64(&reward));
                 return Err(Diagnostic::new("Q304", item.place, text).into());
             }
-            sum = sum_of_rewards(&sum, &rounded(&reward).map_err(fault)?);
+            sum.add(&rounded(&reward).map_err(fault)?);
         }
     }
-    Ok(sum)
+    Ok(sum.total())
 }

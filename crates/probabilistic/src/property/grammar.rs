@@ -174,7 +174,8 @@ fn reward(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Property> {
 }
 
 /// Parses the end of a `P`, `R` or `S` operator: `]`, or the deprecated syntax of a filter,
-/// `{states}{min}]`.
+/// `{states}{min}]`. As in PRISM, `{min}{max}` is the filter `range`, and an operator with a bound has to hold in all of
+/// the states.
 fn filtered(cursor: &mut Cursor<'_>, property: Property, place: Place) -> Read<Property> {
     if !cursor.take("{") {
         cursor.need("]")?;
@@ -182,18 +183,25 @@ fn filtered(cursor: &mut Cursor<'_>, property: Property, place: Place) -> Read<P
     }
     let states = cursor.expression()?;
     cursor.need("}")?;
-    let mut filter = Filter::State;
+    let (mut least, mut greatest) = (false, false);
     while cursor.take("{") {
-        filter = if cursor.take_word("min") {
-            Filter::Min
+        if cursor.take_word("min") {
+            least = true;
         } else if cursor.take_word("max") {
-            Filter::Max
+            greatest = true;
         } else {
             return Err(cursor.expected("`min` or `max`"));
-        };
+        }
         cursor.need("}")?;
     }
     cursor.need("]")?;
+    let filter = match (least, greatest) {
+        _ if property.bound().is_some() => Filter::ForAll,
+        (true, true) => Filter::Range,
+        (true, false) => Filter::Min,
+        (false, true) => Filter::Max,
+        (false, false) => Filter::State,
+    };
     let inner = Expr { kind: ExprKind::Property(Box::new(property)), place };
     Ok(Property::Filter(filter, inner, Some(states)))
 }
