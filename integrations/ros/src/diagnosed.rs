@@ -2,7 +2,7 @@
 //! the monitors of MROS, ROSA and PLANTA; statuses on `/diagnostics` of drivers, which the rules of `ros.toml`
 //! translate; and signals (`[[signals]]` of `ros.toml`), i.e. states and presence of nodes, fields and rates of topics.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -11,16 +11,16 @@ use metaplan::mapek::FilterSettings;
 use metaplan::message::Message;
 use smol::Task;
 
-use crate::diagnostic_rules::{COMPONENT, DiagnosticRule, MEASUREMENT};
-use crate::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::diagnostic_rules::{COMPONENT, DiagnosticRule, FAILED, MEASUREMENT};
+use crate::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus};
 use crate::interfaces::std_msgs::msg::Header;
 use crate::node::{Clock, Node, keep_all};
 use crate::signals::{self, Signal};
 
 const MAX_UNUSED: usize = 20;
 
-/// Diagnostics and signals that are not handled yet. Only the latest status of each subject (message and keys of the
-/// status) is kept, so that a slow loop does not fall behind.
+/// Diagnostics and signals that are not handled yet. Only the latest value of each component and attribute is kept, so
+/// that a slow loop does not fall behind.
 pub(crate) struct Diagnosed {
     queue: Arc<Queue>,
     /// Tasks that observe the signals. They end when this value is dropped.
@@ -64,42 +64,102 @@ struct Queue {
     clock: Arc<Clock>,
 }
 
+/// Message of a status, and the key of one of its values.
+type Subject = (String, String);
+
+/// Origin of a status. The statuses of one component by several origins are combined.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Origin {
+    /// All monitors of MROS, ROSA and PLANTA, of which the last status counts.
+    Monitors,
+    /// A driver's diagnostic with this name.
+    Diagnostic(String),
+    /// The signal with this index in `ros.toml`.
+    Signal(usize),
+}
+
+/// State of a [`Queue`]. Each of its statuses has one value.
 #[derive(Debug, Default)]
 struct QueueState {
     header: Header,
-    statuses: Vec<(String, DiagnosticStatus)>,
-    /// Last values by subject (message and keys of a status), with the time of their report.
-    last: HashMap<String, (Vec<KeyValue>, Duration)>,
+    pending: Vec<(Subject, DiagnosticStatus)>,
+    statuses: HashMap<Subject, BTreeMap<Origin, DiagnosticStatus>>,
+    /// Last value of each subject, with the time of its report.
+    last: HashMap<Subject, (String, Duration)>,
 }
 
 impl Queue {
-    /// Adds statuses, which replace pending ones of their subjects. A status with the last values of its
-    /// subject is ignored, unless a filter needs the repetition.
-    fn add(&self, header: Header, statuses: impl IntoIterator<Item = DiagnosticStatus>) {
+    /// Adds statuses, which replace pending ones of their subjects. The last value of a subject is ignored when it is
+    /// repeated, unless a filter needs the repetition.
+    fn add(&self, header: Header, statuses: impl IntoIterator<Item = (Origin, DiagnosticStatus)>) {
         let now = self.clock.elapsed();
         let mut guard = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let state = &mut *guard;
-        let is_first = state.statuses.is_empty();
+        let is_first = state.pending.is_empty();
         state.header = header;
-        for status in statuses {
-            let keys: Vec<&str> = status.values.iter().map(|pair| pair.key.as_str()).collect();
-            let subject = format!("{}\u{0}{}", status.message, keys.join("\u{0}"));
-            let repeat = keys.iter().filter_map(|key| self.repeats.get(*key)).min();
-            let is_known = state.last.get(&subject).is_some_and(|(values, since)| {
-                *values == status.values && repeat.is_none_or(|repeat| now.saturating_sub(*since) < *repeat)
+        let mut subjects = Vec::new();
+        for (origin, status) in statuses {
+            subjects.extend(state.note(&origin, status));
+        }
+        for subject in subjects {
+            let Some(status) = state.combined(&subject) else { continue };
+            let value = value(&status);
+            let repeat = self.repeats.get(&subject.1);
+            let is_repeated = state.last.get(&subject).is_some_and(|(last, since)| {
+                last == value && repeat.is_none_or(|repeat| now.saturating_sub(*since) < *repeat)
             });
-            if !is_known {
-                state.last.insert(subject.clone(), (status.values.clone(), now));
-                state.statuses.retain(|(known, _)| *known != subject);
-                state.statuses.push((subject, status));
+            if !is_repeated {
+                state.last.insert(subject.clone(), (value.to_owned(), now));
+                state.pending.retain(|(pending, _)| *pending != subject);
+                state.pending.push((subject, status));
             }
         }
-        let waits = is_first && !state.statuses.is_empty();
+        let waits = is_first && !state.pending.is_empty();
         drop(guard);
         if waits {
             (self.waits)();
         }
     }
+
+    /// Returns the pending statuses with the last header, and clears them.
+    fn take(&self) -> DiagnosticArray {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let pending = std::mem::take(&mut state.pending);
+        let status = pending.into_iter().map(|(_, status)| status).collect();
+        DiagnosticArray { header: state.header.clone(), status }
+    }
+}
+
+impl QueueState {
+    /// Notes each value of a status as the last one of its subject and origin, and returns the subjects. If a key
+    /// occurs several times, its first value counts, as in the loop.
+    fn note(&mut self, origin: &Origin, mut status: DiagnosticStatus) -> Vec<Subject> {
+        let values = std::mem::take(&mut status.values);
+        // The last measurement of an attribute counts, from whichever origin.
+        let origin = if status.message == COMPONENT { origin } else { &Origin::Monitors };
+        let (mut keys, mut subjects) = (HashSet::new(), Vec::new());
+        for pair in values {
+            let key = pair.key.trim().to_owned();
+            if keys.insert(key.clone()) {
+                let subject = (status.message.clone(), key);
+                let single = DiagnosticStatus { values: vec![pair], ..status.clone() };
+                self.statuses.entry(subject.clone()).or_default().insert(origin.clone(), single);
+                subjects.push(subject);
+            }
+        }
+        subjects
+    }
+
+    /// Returns the status of a subject: a failure if any origin reports one, otherwise the status of the monitors if
+    /// they have reported one, because only they distinguish RECOVERED from TRUE.
+    fn combined(&self, subject: &Subject) -> Option<DiagnosticStatus> {
+        let statuses = self.statuses.get(subject)?;
+        statuses.values().find(|status| value(status) == FAILED).or_else(|| statuses.values().next()).cloned()
+    }
+}
+
+fn value(status: &DiagnosticStatus) -> &str {
+    status.values.first().map_or("", |pair| pair.value.as_str())
 }
 
 impl Diagnosed {
@@ -136,8 +196,9 @@ impl Diagnosed {
             of_topic.add(array.header, statuses);
         })?;
         let (of_signals, clock) = (Arc::clone(&queue), node.clock());
-        let report: signals::Report = Arc::new(move |status| {
-            of_signals.add(Header { stamp: clock.stamp(), ..Header::default() }, [status]);
+        let report: signals::Report = Arc::new(move |index, status| {
+            let header = Header { stamp: clock.stamp(), ..Header::default() };
+            of_signals.add(header, [(Origin::Signal(index), status)]);
         });
         let signals = signals::watch(node, &signals, &report)?;
         Ok(Self { queue, _signals: signals })
@@ -145,24 +206,23 @@ impl Diagnosed {
 
     /// Returns the pending statuses as an input line and clears them.
     pub(crate) fn line(&self) -> String {
-        let mut state = self.queue.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let (header, statuses) = (state.header.clone(), std::mem::take(&mut state.statuses));
-        drop(state);
-        let status = statuses.into_iter().map(|(_, status)| status).collect();
         // Serialisation cannot fail: the message consists of texts and numbers.
-        serde_json::to_string(&DiagnosticArray { header, status }).unwrap_or_default()
+        serde_json::to_string(&self.queue.take()).unwrap_or_default()
     }
 }
 
 /// Translates a status to statuses that the loop can read: the results of matching rules, and the status itself if
 /// its message is one of MROS's monitors.
-fn translated(rules: &[DiagnosticRule], status: &DiagnosticStatus) -> Vec<DiagnosticStatus> {
-    let mut statuses: Vec<DiagnosticStatus> =
-        rules.iter().filter_map(|rule| rule.translate(status)).collect();
+fn translated(rules: &[DiagnosticRule], status: &DiagnosticStatus) -> Vec<(Origin, DiagnosticStatus)> {
+    let mut results: Vec<DiagnosticStatus> = rules.iter().filter_map(|rule| rule.translate(status)).collect();
+    // The last result for a component replaces the earlier ones of the same diagnostic.
+    results.sort_by_key(|result| value(result) == FAILED);
+    let mut statuses: Vec<(Origin, DiagnosticStatus)> =
+        results.into_iter().map(|result| (Origin::Diagnostic(status.name.clone()), result)).collect();
     let spelling =
         [MEASUREMENT, COMPONENT].into_iter().find(|message| status.message.eq_ignore_ascii_case(message));
-    statuses
-        .extend(spelling.map(|message| DiagnosticStatus { message: message.to_owned(), ..status.clone() }));
+    let of_monitor = |message: &str| DiagnosticStatus { message: message.to_owned(), ..status.clone() };
+    statuses.extend(spelling.map(|message| (Origin::Monitors, of_monitor(message))));
     statuses
 }
 
@@ -178,4 +238,170 @@ fn suggestion(status: &DiagnosticStatus) -> String {
         name = status.name,
         message = status.message
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::sync::Mutex;
+
+    use super::{
+        COMPONENT, DiagnosticRule, DiagnosticStatus, Header, MEASUREMENT, Origin, Queue, translated,
+    };
+    use crate::interfaces::diagnostic_msgs::msg::KeyValue;
+    use crate::node::Clock;
+
+    const RULE: &str = "name = \"lidar: *\"\ncomponent = \"c_lidar\"";
+
+    /// A queue whose statuses are handled at once, with the last values that the loop has received.
+    struct Handled {
+        rules: Vec<DiagnosticRule>,
+        queue: Queue,
+        values: BTreeMap<String, String>,
+    }
+
+    impl Handled {
+        fn new(rules: &[&str]) -> Self {
+            let rules = rules.iter().map(|rule| toml::from_str(rule).expect("a rule")).collect();
+            let queue = Queue {
+                state: Mutex::default(),
+                repeats: BTreeMap::new(),
+                waits: Box::new(|| {}),
+                clock: Clock::new(),
+            };
+            Self { rules, queue, values: BTreeMap::new() }
+        }
+
+        /// Adds the statuses of an array, and returns the number of values that the loop receives.
+        fn publish(&mut self, array: &[DiagnosticStatus]) -> usize {
+            let translated = array.iter().flat_map(|status| translated(&self.rules, status));
+            self.queue.add(Header::default(), translated);
+            self.handle()
+        }
+
+        fn signal(&mut self, index: usize, status: DiagnosticStatus) -> usize {
+            self.queue.add(Header::default(), [(Origin::Signal(index), status)]);
+            self.handle()
+        }
+
+        fn handle(&mut self) -> usize {
+            let pairs: Vec<KeyValue> =
+                self.queue.take().status.into_iter().flat_map(|status| status.values).collect();
+            let count = pairs.len();
+            self.values.extend(pairs.into_iter().map(|KeyValue { key, value }| (key, value)));
+            count
+        }
+
+        fn value(&self, key: &str) -> &str {
+            self.values.get(key).map_or("", String::as_str)
+        }
+    }
+
+    fn driver(name: &str, level: u8) -> DiagnosticStatus {
+        DiagnosticStatus { name: name.to_owned(), level, ..DiagnosticStatus::default() }
+    }
+
+    fn monitor(message: &str, pairs: &[(&str, &str)]) -> DiagnosticStatus {
+        let pair = |(key, value): &(&str, &str)| KeyValue { key: (*key).into(), value: (*value).into() };
+        DiagnosticStatus {
+            message: message.to_owned(),
+            values: pairs.iter().map(pair).collect(),
+            ..DiagnosticStatus::default()
+        }
+    }
+
+    /// Returns all sequences of `length` items.
+    fn sequences<T: Copy>(items: &[T], length: usize) -> Vec<Vec<T>> {
+        (0..length).fold(vec![Vec::new()], |shorter, _| {
+            let longer = |sequence: &Vec<T>| {
+                items.iter().map(|item| [sequence.as_slice(), &[*item]].concat()).collect::<Vec<_>>()
+            };
+            shorter.iter().flat_map(longer).collect()
+        })
+    }
+
+    #[test]
+    fn a_component_has_failed_while_one_of_its_diagnostics_reports_a_failure() {
+        let mut robot = Handled::new(&[RULE]);
+        let array = [driver("lidar: connection", 2), driver("lidar: frequency", 0)];
+        assert_eq!((robot.publish(&array), robot.value("c_lidar")), (1, "FALSE"));
+        assert_eq!(robot.publish(&array), 0, "the next period repeats the values");
+        // One array in which the failure moves from one status to the other.
+        let array = [driver("lidar: connection", 0), driver("lidar: frequency", 2)];
+        assert_eq!(robot.publish(&array), 0);
+        let items: Vec<(&str, u8)> =
+            ["lidar: a", "lidar: b"].into_iter().flat_map(|name| [(name, 0), (name, 2)]).collect();
+        for sequence in sequences(&items, 4) {
+            let (mut robot, mut levels) = (Handled::new(&[RULE]), BTreeMap::new());
+            for (name, level) in &sequence {
+                robot.publish(&[driver(name, *level)]);
+                levels.insert(*name, *level);
+                let expected = if levels.values().any(|level| *level == 2) { "FALSE" } else { "TRUE" };
+                assert_eq!(robot.value("c_lidar"), expected, "{sequence:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_rules_for_a_component_are_combined_for_each_diagnostic() {
+        let strict = "name = \"*front\"\ncomponent = \"c_lidar\"\nfails_at = \"WARN\"";
+        for rules in [[strict, RULE], [RULE, strict]] {
+            let mut robot = Handled::new(&rules);
+            robot.publish(&[driver("lidar: front", 1)]);
+            assert_eq!(robot.value("c_lidar"), "FALSE", "{rules:?}");
+            robot.publish(&[driver("lidar: front", 0)]);
+            assert_eq!(robot.value("c_lidar"), "TRUE", "{rules:?}");
+        }
+        // Two rules for two texts of one diagnostic: the last text counts.
+        let by_text = ["message = \"*lost\"\ncomponent = \"c\"", "message = \"found\"\ncomponent = \"c\""];
+        let mut robot = Handled::new(&by_text);
+        for (message, level, expected) in [("lost", 2, "FALSE"), ("found", 0, "TRUE")] {
+            robot.publish(&[DiagnosticStatus { message: message.to_owned(), ..driver("lidar", level) }]);
+            assert_eq!(robot.value("c"), expected);
+        }
+    }
+
+    #[test]
+    fn the_sources_of_a_component_are_combined() {
+        let status = |value| monitor(COMPONENT, &[("c_lidar", value)]);
+        let mut robot = Handled::new(&[RULE]);
+        robot.signal(0, status("TRUE"));
+        robot.signal(1, status("FALSE"));
+        assert_eq!((robot.signal(0, status("TRUE")), robot.value("c_lidar")), (0, "FALSE"));
+        robot.signal(1, status("TRUE"));
+        assert_eq!(robot.value("c_lidar"), "TRUE");
+        robot.publish(&[driver("lidar: driver", 3)]);
+        assert_eq!((robot.publish(&[status("RECOVERED")]), robot.value("c_lidar")), (0, "FALSE"));
+        robot.publish(&[driver("lidar: driver", 0)]);
+        assert_eq!(robot.value("c_lidar"), "RECOVERED", "only monitors distinguish it from TRUE");
+        robot.publish(&[status("ERROR")]);
+        assert_eq!((robot.signal(0, status("TRUE")), robot.value("c_lidar")), (0, "ERROR"));
+    }
+
+    #[test]
+    fn the_last_value_of_each_key_counts_whichever_keys_its_status_has() {
+        for (message, values) in [(COMPONENT, ["FALSE", "TRUE"]), (MEASUREMENT, ["0.2", "0.9"])] {
+            let [low, high] = values;
+            let statuses: [&[(&str, &str)]; 6] = [
+                &[("a", low)],
+                &[("a", high)],
+                &[("b", low)],
+                &[("a", high), ("b", high)],
+                &[("b", low), ("a", low)],
+                // The loop ignores a second value of a key.
+                &[("a", low), ("a ", high)],
+            ];
+            for sequence in sequences(&statuses, 3) {
+                let (mut robot, mut expected) = (Handled::new(&[]), BTreeMap::new());
+                for pairs in &sequence {
+                    robot.publish(&[monitor(message, pairs)]);
+                    expected.extend(pairs.iter().rev().map(|(key, value)| (key.trim(), *value)));
+                    for (key, value) in &expected {
+                        assert_eq!(robot.value(key), *value, "{sequence:?}");
+                    }
+                    assert_eq!(robot.publish(&[monitor(message, pairs)]), 0, "{sequence:?}");
+                }
+            }
+        }
+    }
 }

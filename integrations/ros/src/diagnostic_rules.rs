@@ -16,6 +16,12 @@ pub(crate) const MEASUREMENT: &str = "QA status";
 /// Message of a status that reports components, in the spelling of MROS.
 pub(crate) const COMPONENT: &str = "Component status";
 
+/// Value of a component that works, in the spelling of MROS.
+pub(crate) const WORKING: &str = "TRUE";
+
+/// Value of a component that has failed, in the spelling of MROS.
+pub(crate) const FAILED: &str = "FALSE";
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnosticRule {
     name: Pattern,
@@ -124,7 +130,7 @@ impl DiagnosticRule {
         }
         let (message, key, value) = match &self.target {
             Target::Component { component, fails_at } => {
-                let value = if status.level >= *fails_at as u8 { "FALSE" } else { "TRUE" };
+                let value = if status.level >= *fails_at as u8 { FAILED } else { WORKING };
                 (COMPONENT, component, value.to_owned())
             }
             Target::Attribute { attribute, key, conversion } => {

@@ -327,8 +327,9 @@ impl Driver {
     }
 }
 
-/// Returns the inputs that arrive until the node is active, `stop` is set, or there are [`MAX_DELAYED_INPUTS`].
-/// Calls `idle` at least every 50 ms, with the number of a request that must be refused, if there is one.
+/// Returns the inputs that arrive until the node is active, `stop` is set, or there are [`MAX_DELAYED_INPUTS`]. Of the
+/// progress of an action, only the last report is returned. Calls `idle` at least every 50 ms, with the number of a
+/// request that must be refused, if there is one.
 fn delayed_inputs(
     inputs: &Receiver<Input>,
     active: &AtomicBool,
@@ -341,6 +342,11 @@ fn delayed_inputs(
         match inputs.recv_timeout(Duration::from_millis(50)) {
             Ok(Input::Request(number, _) | Input::Cancel(number, _)) => idle(Some(number)),
             Ok(input) => {
+                if let Input::Progress(number, _) = input {
+                    delayed.retain(
+                        |earlier| !matches!(earlier, Input::Progress(action, _) if *action == number),
+                    );
+                }
                 delayed.push(input);
                 idle(None);
             }
@@ -372,5 +378,23 @@ mod tests {
         });
         assert_eq!(refused, [7]);
         assert!(matches!(delayed[..], [Input::Tick]), "{delayed:?}");
+    }
+
+    #[test]
+    fn only_the_last_progress_of_an_action_waits_for_the_activation() {
+        let (sender, inputs) = mpsc::channel();
+        for percent in 0..100 {
+            for number in [3, 4] {
+                sender.send(Input::Progress(number, f64::from(percent) / 100.0)).expect("a receiver");
+            }
+        }
+        sender.send(Input::Tick).expect("a receiver");
+        drop(sender);
+        let (active, stop) = (AtomicBool::new(false), AtomicBool::new(false));
+        let delayed = delayed_inputs(&inputs, &active, &stop, |_| {});
+        let [Input::Progress(3, third), Input::Progress(4, fourth), Input::Tick] = delayed[..] else {
+            panic!("{delayed:?}");
+        };
+        assert_eq!((third.to_string(), fourth.to_string()), ("0.99".to_owned(), "0.99".to_owned()));
     }
 }

@@ -39,7 +39,10 @@ const OBSERVATION_DELAY: Duration = Duration::from_millis(500);
 /// before the server has discovered this node.
 const MAX_MODE_REQUESTS: u32 = 3;
 
-/// Minimum time after a report of progress until feedback without a share repeats this report.
+/// Minimum time after a report of progress until the next one with another share.
+const CHANGE_PERIOD: Duration = Duration::from_millis(100);
+
+/// Minimum time after a report of progress until feedback repeats this report.
 const REPEAT_PERIOD: Duration = Duration::from_secs(1);
 
 #[derive(Clone)]
@@ -422,21 +425,28 @@ impl Robot {
 
 #[derive(Debug, Default)]
 struct Reports {
-    /// The last known share, with the time of its last report.
+    /// The last known share, in hundredths.
+    share: Option<f64>,
+    /// The last reported share, with the time of its report.
     last: Option<(f64, Instant)>,
 }
 
 impl Reports {
-    /// Returns the completed share that feedback reports. Feedback without a share repeats the last known one, at most
-    /// once per [`REPEAT_PERIOD`]: it shows that the action goes on, which the loop would otherwise cancel for silence.
+    /// Returns the completed share that feedback reports, rounded to hundredths. Feedback without a share repeats the
+    /// last known one. Repetitions are limited by [`REPEAT_PERIOD`]. They show that the action goes on, which the loop
+    /// would otherwise cancel for silence. Changes are limited by [`CHANGE_PERIOD`], because each report is a line of
+    /// the journal, and Nav2 sends 100 messages per second.
     fn fraction(&mut self, completion: Option<f32>, now: Instant) -> Option<f64> {
-        let repeated = || {
-            let (last, since) = self.last?;
-            (now.saturating_duration_since(since) >= REPEAT_PERIOD).then_some(last)
-        };
-        let fraction = completion.map(f64::from).or_else(repeated)?;
-        self.last = Some((fraction, now));
-        Some(fraction)
+        self.share = completion.map(|share| (f64::from(share) * 100.0).round()).or(self.share);
+        let share = self.share?;
+        let is_due = self.last.is_none_or(|(last, since)| {
+            let period = if (share - last).abs() < 0.5 { REPEAT_PERIOD } else { CHANGE_PERIOD };
+            now.saturating_duration_since(since) >= period
+        });
+        is_due.then(|| {
+            self.last = Some((share, now));
+            share / 100.0
+        })
     }
 }
 
@@ -537,5 +547,29 @@ mod tests {
         assert_eq!(at(1100, None), Some(0.5));
         assert_eq!(at(1200, None), None);
         assert_eq!(at(1300, Some(0.75)), Some(0.75));
+    }
+
+    #[test]
+    fn frequent_feedback_is_reported_at_most_ten_times_per_second() {
+        let start = Instant::now();
+        // Ten seconds of feedback every 10 ms, as of Nav2: the number of reports by the final share.
+        for (last_share, expected) in [(1.0, 100), (0.4, 41), (0.0, 10)] {
+            let (mut reports, mut shares) = (Reports::default(), Vec::new());
+            for step in 0..1000_u16 {
+                let share = last_share * f32::from(step) / 1000.0;
+                let now = start + Duration::from_millis(10) * u32::from(step);
+                shares.extend(reports.fraction(Some(share), now));
+            }
+            assert_eq!(shares.len(), expected, "{shares:?}");
+            assert!(shares.is_sorted(), "{shares:?}");
+            assert!((shares[shares.len() - 1] - f64::from(last_share)).abs() < 0.015, "{shares:?}");
+        }
+        // A share that was not reported at once is repeated.
+        let mut reports = Reports::default();
+        let mut at =
+            |millis: u64, completion| reports.fraction(completion, start + Duration::from_millis(millis));
+        assert_eq!(at(0, Some(0.1)), Some(0.1));
+        assert_eq!(at(10, Some(0.257)), None);
+        assert_eq!(at(100, None), Some(0.26));
     }
 }

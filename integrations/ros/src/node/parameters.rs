@@ -242,18 +242,27 @@ impl Node {
     }
 }
 
-/// Converts a value to the type of `current`. An integer is accepted for a double.
+/// Converts a value to the type of `current`. An integer is accepted for a double, also in lists, and an empty list for
+/// a list of any type.
 pub(crate) fn fitting(current: &ParameterValue, value: ParameterValue) -> Result<ParameterValue, String> {
     match (current, value) {
         (ParameterValue::Double(_), ParameterValue::Integer(whole)) => {
             Ok(ParameterValue::Double(whole as f64))
         }
-        (ParameterValue::StringArray(_), ParameterValue::StringArray(list)) => {
-            Ok(ParameterValue::StringArray(list))
+        (ParameterValue::DoubleArray(_), ParameterValue::IntegerArray(list)) => {
+            Ok(ParameterValue::DoubleArray(list.into_iter().map(|whole| whole as f64).collect()))
+        }
+        // An empty list is parsed as a list of strings.
+        (current, ParameterValue::StringArray(items)) if items.is_empty() => {
+            empty_list(current).ok_or_else(|| mismatch(current))
         }
         (current, value) if raw(current.clone()).r#type == raw(value.clone()).r#type => Ok(value),
-        (current, _) => Err(format!("has another type; it is {}", kind(current))),
+        (current, _) => Err(mismatch(current)),
     }
+}
+
+fn mismatch(current: &ParameterValue) -> String {
+    format!("has another type; it is {}", kind(current))
 }
 
 fn kind(value: &ParameterValue) -> &'static str {
@@ -269,6 +278,18 @@ fn kind(value: &ParameterValue) -> &'static str {
         | ParameterValue::DoubleArray(_)
         | ParameterValue::StringArray(_) => "a list",
     }
+}
+
+/// Returns the empty list of the type of a list, and `None` for other values.
+fn empty_list(value: &ParameterValue) -> Option<ParameterValue> {
+    Some(match value {
+        ParameterValue::ByteArray(_) => ParameterValue::ByteArray(Vec::new()),
+        ParameterValue::BooleanArray(_) => ParameterValue::BooleanArray(Vec::new()),
+        ParameterValue::IntegerArray(_) => ParameterValue::IntegerArray(Vec::new()),
+        ParameterValue::DoubleArray(_) => ParameterValue::DoubleArray(Vec::new()),
+        ParameterValue::StringArray(_) => ParameterValue::StringArray(Vec::new()),
+        _ => return None,
+    })
 }
 
 fn result(outcome: Result<(), String>) -> msg::SetParametersResult {
@@ -354,7 +375,8 @@ pub(crate) fn parameter(value: msg::ParameterValue) -> Option<ParameterValue> {
 mod tests {
     use ros2_client::ParameterValue;
 
-    use super::{Declared, duration, listed};
+    use super::{Declared, duration, fitting, listed};
+    use crate::node::arguments::parameter_value;
 
     #[test]
     fn unusable_durations_are_rejected() {
@@ -366,6 +388,32 @@ mod tests {
         for value in [ParameterValue::Double(0.0), ParameterValue::Double(0.5), ParameterValue::Integer(3)] {
             assert!(declared.accept(value.clone()).is_ok(), "{value:?}");
         }
+    }
+
+    #[test]
+    fn lists_are_converted_to_the_present_type() {
+        let check = |current: ParameterValue, yaml: &str, expected: Option<ParameterValue>| {
+            let value = serde_yaml_ng::from_str(yaml).ok().as_ref().and_then(parameter_value);
+            let converted = fitting(&current, value.expect("a value"));
+            assert_eq!(converted.as_ref().ok(), expected.as_ref(), "{current:?} {yaml}: {converted:?}");
+        };
+        let doubles = |list: &[f64]| ParameterValue::DoubleArray(list.to_vec());
+        let integers = |list: &[i64]| ParameterValue::IntegerArray(list.to_vec());
+        let texts =
+            |list: &[&str]| ParameterValue::StringArray(list.iter().map(|text| (*text).to_owned()).collect());
+        let truths = |list: &[bool]| ParameterValue::BooleanArray(list.to_vec());
+        check(doubles(&[2.5]), "[2, 0, 3]", Some(doubles(&[2.0, 0.0, 3.0])));
+        check(doubles(&[]), "[2, 0.5]", Some(doubles(&[2.0, 0.5])));
+        check(integers(&[1]), "[2, 0.5]", None);
+        check(doubles(&[2.5]), "[]", Some(doubles(&[])));
+        check(integers(&[1]), "[]", Some(integers(&[])));
+        check(truths(&[true]), "[]", Some(truths(&[])));
+        check(texts(&["a"]), "[]", Some(texts(&[])));
+        check(ParameterValue::ByteArray(vec![1]), "[]", Some(ParameterValue::ByteArray(Vec::new())));
+        check(texts(&["a"]), "[b]", Some(texts(&["b"])));
+        check(ParameterValue::String("a".to_owned()), "[]", None);
+        check(ParameterValue::Double(1.0), "[2]", None);
+        check(texts(&["a"]), "[2]", None);
     }
 
     #[test]

@@ -23,6 +23,10 @@ const INVALID_PER_LOG_MESSAGE: u64 = 1000;
 /// the subscription.
 const AGE_CHECK_PERIOD: Duration = Duration::from_secs(5);
 
+/// Upper limit on the time for which a writer keeps samples for a killed reader of this program: the lease of 50 s,
+/// and a margin. A sample with a lower stamp is a new one of a writer whose clock is behind.
+const MAX_KEPT_TIME: Duration = Duration::from_secs(60);
+
 /// Filter of samples that were published before the subscription existed. A writer keeps the
 /// samples that a killed reader has not acknowledged. It sends them to the next reader, even if
 /// this reader has not requested old samples.
@@ -32,8 +36,9 @@ struct Old {
 }
 
 impl Old {
-    fn is_old(&self, info: &MessageInfo) -> bool {
-        !self.is_wanted && published(info).is_some_and(|published| published < self.since)
+    fn is_old(&self, published: Option<SystemTime>) -> bool {
+        let age = published.and_then(|published| self.since.duration_since(published).ok());
+        !self.is_wanted && age.is_some_and(|age| !age.is_zero() && age <= MAX_KEPT_TIME)
     }
 }
 
@@ -116,8 +121,9 @@ impl Node {
     }
 
     /// Subscribes to a topic for the lifetime of the node. `take` receives each valid message of a writer
-    /// with the expected type. Unless `qos` is transient local, messages that were published before the
-    /// subscription and arrive in its first five seconds are discarded.
+    /// with the expected type. Unless `qos` is transient local, messages that arrive in the first five seconds of the
+    /// subscription, and were published less than a minute before it by the clock of their writer, are discarded. The
+    /// first one is logged.
     ///
     /// # Errors
     /// Fails if the name is invalid, or the topic exists with another type.
@@ -166,12 +172,20 @@ impl Node {
         let old = Old { since: SystemTime::now(), is_wanted: qos_wants_old };
         self.spawn(async move {
             let mut samples = Box::pin(subscription.async_stream());
-            let mut invalid_count = 0;
+            let (mut invalid_count, mut is_logged) = (0, false);
             while let Some(sample) = samples.next().await {
                 let Some(node) = weak.upgrade() else { return };
                 match sample {
                     Ok((_, info)) if node.graph.is_unfit(info.publisher_gid()) => {}
-                    Ok((_, info)) if start.elapsed() < AGE_CHECK_PERIOD && old.is_old(&info) => {}
+                    Ok((_, info)) if start.elapsed() < AGE_CHECK_PERIOD && old.is_old(published(&info)) => {
+                        if !std::mem::replace(&mut is_logged, true) {
+                            let text = format!(
+                                "messages on {full} that were published before this program subscribed are discarded; if they \
+                                 are new, the clock of their publisher is behind the clock of this host"
+                            );
+                            node.log(Severity::Info, &text);
+                        }
+                    }
                     Ok((message, info)) => take(message, published(&info).unwrap_or_else(SystemTime::now)),
                     Err(error) => {
                         if invalid_count % INVALID_PER_LOG_MESSAGE == 0 {
@@ -192,5 +206,28 @@ impl Node {
     fn expect_message(&self, full: &str, kind: &TopicType<'_>) {
         let type_name = dds_type(kind.package, "msg", kind.name);
         self.graph.expect(format!("rt{full}"), Expected { type_name, hash: kind.hash.clone() });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, UNIX_EPOCH};
+
+    use super::Old;
+
+    #[test]
+    fn samples_are_old_if_a_writer_can_have_kept_them() {
+        let hour = Duration::from_secs(3600);
+        let old = Old { since: UNIX_EPOCH + hour * 24, is_wanted: false };
+        let published = |before: Duration| Some(old.since - before);
+        assert!(old.is_old(published(Duration::from_millis(1))));
+        assert!(old.is_old(published(Duration::from_secs(50))));
+        assert!(!old.is_old(published(hour)), "the clock of the writer is an hour behind");
+        assert!(!old.is_old(Some(UNIX_EPOCH)), "the host of the writer has no clock");
+        assert!(!old.is_old(published(Duration::ZERO)));
+        assert!(!old.is_old(Some(old.since + hour)));
+        assert!(!old.is_old(None));
+        let wanted = Old { is_wanted: true, ..old };
+        assert!(!wanted.is_old(Some(wanted.since - Duration::from_secs(1))));
     }
 }

@@ -1,6 +1,7 @@
 //! Observation of signals, reported to the loop as statuses.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -8,7 +9,7 @@ use metaplan::message::Message;
 use serde_json::Value;
 use smol::{Task, Timer};
 
-use crate::diagnostic_rules::{COMPONENT, MEASUREMENT};
+use crate::diagnostic_rules::{COMPONENT, FAILED, MEASUREMENT, WORKING};
 use crate::interfaces::diagnostic_msgs::msg::{DiagnosticStatus, KeyValue};
 use crate::interfaces::lifecycle_msgs::msg::{State, TransitionEvent};
 use crate::interfaces::lifecycle_msgs::srv::{GetState, GetStateRequest};
@@ -27,17 +28,27 @@ const MIN_SKIPPED_PERIOD: Duration = Duration::from_millis(10);
 /// not have discovered them yet.
 const DISCOVERY_TIME: Duration = Duration::from_secs(3);
 
+/// Time without an advance of the clock after which simulated time counts as paused.
+const PAUSE_TIME: Duration = Duration::from_secs(1);
+
 const STATE_TIMEOUT: Duration = Duration::from_secs(2);
 
-pub(crate) type Report = Arc<dyn Fn(DiagnosticStatus) + Send + Sync>;
+/// Period of the queries of a lifecycle node's state. They correct lost transition events.
+const STATE_PERIOD: Duration = Duration::from_secs(5);
+
+/// Number of successive queries without a valid answer after which a lifecycle node has failed. The first query may
+/// be lost before the server has discovered this node.
+const MAX_UNANSWERED: u32 = 2;
+
+/// Receives the index of a signal and its status.
+pub(crate) type Report = Arc<dyn Fn(usize, DiagnosticStatus) + Send + Sync>;
 
 /// Observes signals. Polling lasts until the returned tasks are dropped, subscriptions last as long
 /// as the node.
 pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Result<Vec<Task<()>>, Message> {
     let mut tasks = Vec::new();
-    for signal in signals {
-        let Signal { source, target, every, .. } = signal;
-        let reporter = Reporter { target: target.clone(), report: Arc::clone(report) };
+    for (index, Signal { source, target, every, .. }) in signals.iter().enumerate() {
+        let reporter = Reporter { index, target: target.clone(), report: Arc::clone(report) };
         match source {
             Source::State { node: name, state } => tasks.push(watch_state(node, name, *state, reporter)?),
             Source::Presence { node: name } => tasks.push(watch_presence(node, name, reporter)),
@@ -135,6 +146,7 @@ fn repeat(period: Duration, mut work: impl FnMut() + Send + 'static) -> Task<()>
 
 #[derive(Clone)]
 struct Reporter {
+    index: usize,
     target: Target,
     report: Report,
 }
@@ -142,7 +154,7 @@ struct Reporter {
 impl Reporter {
     fn works(&self, works: bool) {
         if let Target::Component { component, .. } = &self.target {
-            self.send(COMPONENT, component, if works { "TRUE" } else { "FALSE" }.to_owned());
+            self.send(COMPONENT, component, if works { WORKING } else { FAILED }.to_owned());
         }
     }
 
@@ -165,11 +177,9 @@ impl Reporter {
     }
 
     fn send(&self, message: &str, key: &str, value: String) {
-        (self.report)(DiagnosticStatus {
-            message: message.to_owned(),
-            values: vec![KeyValue { key: key.to_owned(), value }],
-            ..DiagnosticStatus::default()
-        });
+        let values = vec![KeyValue { key: key.to_owned(), value }];
+        let status = DiagnosticStatus { message: message.to_owned(), values, ..DiagnosticStatus::default() };
+        (self.report)(self.index, status);
     }
 }
 
@@ -193,6 +203,31 @@ fn watch_silence(
     })
 }
 
+/// Arrivals of messages by the clock of the node.
+#[derive(Debug)]
+struct Arrivals {
+    times: VecDeque<Duration>,
+    /// Time of the last count, and the instant since which the clock has had this time.
+    counted: (Duration, Instant),
+}
+
+impl Arrivals {
+    /// Returns the number of arrivals within the last `period`. Returns `None` while simulated time is paused: then no
+    /// rate exists, and arrivals are not kept.
+    fn count(&mut self, period: Duration, now: Duration, instant: Instant) -> Option<usize> {
+        if now > self.counted.0 {
+            self.counted = (now, instant);
+        } else if instant.saturating_duration_since(self.counted.1) >= PAUSE_TIME {
+            self.times.retain(|arrival| *arrival < now);
+            return None;
+        }
+        while self.times.front().is_some_and(|arrival| now.saturating_sub(*arrival) > period) {
+            self.times.pop_front();
+        }
+        Some(self.times.len())
+    }
+}
+
 /// Reports the messages per second within the last period. Without a condition, a component works if there
 /// was any message.
 fn watch_rate(
@@ -203,21 +238,19 @@ fn watch_rate(
     reporter: Reporter,
 ) -> Result<Task<()>, Message> {
     let clock = node.clock();
-    let arrivals: Arc<Mutex<VecDeque<Duration>>> = Arc::default();
+    let started = clock.elapsed();
+    let arrivals = Arrivals { times: VecDeque::new(), counted: (started, Instant::now()) };
+    let arrivals = Arc::new(Mutex::new(arrivals));
     let (noted, of_arrivals) = (Arc::clone(&arrivals), node.clock());
     node.subscribe_any(topic, move || {
-        noted.lock().unwrap_or_else(PoisonError::into_inner).push_back(of_arrivals.elapsed());
+        noted.lock().unwrap_or_else(PoisonError::into_inner).times.push_back(of_arrivals.elapsed());
     })?;
-    let started = clock.elapsed();
     let mut first_arrival = None;
     Ok(repeat(every.max(CHECK_PERIOD.min(period)), move || {
         let now = clock.elapsed();
         let mut arrivals = arrivals.lock().unwrap_or_else(PoisonError::into_inner);
-        while arrivals.front().is_some_and(|arrival| now.saturating_sub(*arrival) > period) {
-            arrivals.pop_front();
-        }
-        let count = arrivals.len();
-        first_arrival = first_arrival.or(arrivals.front().copied());
+        let Some(count) = arrivals.count(period, now, Instant::now()) else { return };
+        first_arrival = first_arrival.or(arrivals.times.front().copied());
         drop(arrivals);
         // The rate is known a period after the first message. A topic without messages may not be discovered yet.
         let known_from = match first_arrival {
@@ -252,8 +285,35 @@ fn watch_presence(node: &Arc<Node>, name: &str, reporter: Reporter) -> Task<()> 
     })
 }
 
-/// Reports whether a lifecycle node has a state: at the start and the end of each transition, and when
-/// its service appears or disappears.
+/// Queries of the state of a lifecycle node.
+#[derive(Debug)]
+struct StateQueries {
+    /// Servers at the last answer.
+    servers: BTreeSet<[u8; 16]>,
+    answered: Instant,
+    /// Number of queries since the last answer.
+    unanswered: u32,
+}
+
+impl StateQueries {
+    /// Returns `true` if the servers have changed since the last answer, or if [`STATE_PERIOD`] has passed.
+    fn is_due(&self, servers: &BTreeSet<[u8; 16]>, now: Instant) -> bool {
+        self.servers != *servers || now.saturating_duration_since(self.answered) >= STATE_PERIOD
+    }
+
+    /// Notes whether the node has the required state, or `None` if it has not answered. Returns the status to report.
+    fn note(&mut self, servers: BTreeSet<[u8; 16]>, answer: Option<bool>, now: Instant) -> Option<bool> {
+        if answer.is_some() {
+            *self = Self { servers, answered: now, unanswered: 0 };
+            return answer;
+        }
+        self.unanswered += 1;
+        (self.unanswered >= MAX_UNANSWERED).then_some(false)
+    }
+}
+
+/// Reports whether a lifecycle node has a state: at the start and the end of each transition, when its service appears
+/// or disappears, and periodically. A node whose service does not answer does not have the state.
 fn watch_state(
     node: &Arc<Node>,
     name: &str,
@@ -261,7 +321,10 @@ fn watch_state(
     reporter: Reporter,
 ) -> Result<Task<()>, Message> {
     let of_event = reporter.clone();
+    let events = Arc::new(AtomicU64::new(0));
+    let counter = Arc::clone(&events);
     let take = move |goal: &State| {
+        counter.fetch_add(1, Ordering::Relaxed);
         // A node in a transition has neither the former nor the next state.
         of_event.works(PrimaryState::of(goal) == Some(state));
     };
@@ -273,19 +336,26 @@ fn watch_state(
     }
     let service: Caller<GetState> = node.caller(&format!("{name}/get_state"));
     let started = Instant::now();
-    let mut last_servers = None;
+    let mut queries = StateQueries { servers: BTreeSet::new(), answered: started, unanswered: 0 };
+    let mut was_seen = false;
     Ok(smol::spawn(async move {
         loop {
             let servers = service.servers();
-            if last_servers.as_ref() != Some(&servers) {
-                if servers.is_empty() {
-                    if last_servers.is_some() || started.elapsed() > DISCOVERY_TIME {
-                        reporter.works(false);
-                        last_servers = Some(servers);
-                    }
-                } else if let Ok(answer) = service.call(GetStateRequest::default(), STATE_TIMEOUT).await {
-                    reporter.works(PrimaryState::of(&answer.current_state) == Some(state));
-                    last_servers = Some(servers);
+            was_seen |= !servers.is_empty();
+            if servers.is_empty() {
+                if was_seen || started.elapsed() > DISCOVERY_TIME {
+                    reporter.works(false);
+                }
+                queries.servers = servers;
+            } else if queries.is_due(&servers, Instant::now()) {
+                let event_count = events.load(Ordering::Relaxed);
+                let answer = service.call(GetStateRequest::default(), STATE_TIMEOUT).await;
+                let answer = answer.ok().map(|answer| PrimaryState::of(&answer.current_state) == Some(state));
+                // An event during the query may be newer than the answer, which is then ignored.
+                if events.load(Ordering::Relaxed) == event_count
+                    && let Some(works) = queries.note(servers, answer, Instant::now())
+                {
+                    reporter.works(works);
                 }
             }
             Timer::after(CHECK_PERIOD).await;
@@ -295,9 +365,66 @@ fn watch_state(
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use std::collections::{BTreeSet, VecDeque};
+    use std::time::{Duration, Instant};
 
-    use super::Samples;
+    use super::{Arrivals, Samples, StateQueries};
+
+    #[test]
+    fn arrivals_are_counted_within_the_period() {
+        let (start, period) = (Instant::now(), Duration::from_secs(2));
+        let mut arrivals = Arrivals { times: VecDeque::new(), counted: (Duration::ZERO, start) };
+        // The clock runs at five times the real time, with 20 messages per second of the clock.
+        for step in 1..=400_u32 {
+            let now = Duration::from_millis(50) * step;
+            arrivals.times.push_back(now);
+            let expected = usize::try_from(step.min(41)).expect("a number");
+            assert_eq!(arrivals.count(period, now, start + now / 5), Some(expected));
+        }
+    }
+
+    #[test]
+    fn messages_have_no_rate_while_simulated_time_is_paused() {
+        let (start, period) = (Instant::now(), Duration::from_secs(2));
+        let seconds = Duration::from_secs;
+        let mut arrivals = Arrivals { times: VecDeque::new(), counted: (seconds(0), start) };
+        for millis in (8100..=10_000).step_by(100) {
+            arrivals.times.push_back(Duration::from_millis(millis));
+        }
+        assert_eq!(arrivals.count(period, seconds(10), start), Some(20));
+        // 20 messages per second arrive during an hour, and are counted every 250 ms.
+        for step in 1..=4 * 3600 {
+            arrivals.times.extend([seconds(10); 5]);
+            let count = arrivals.count(period, seconds(10), start + Duration::from_millis(250) * step);
+            assert_eq!(count.is_none(), step >= 4, "{step}");
+            assert!(arrivals.times.len() <= 20 + 15, "{}", arrivals.times.len());
+        }
+        // Time continues, but the sensor has stopped: of 8.1 to 9.9 s, the last five arrivals are within the period.
+        let resumed = start + seconds(3601);
+        assert_eq!(arrivals.count(period, Duration::from_millis(11_500), resumed), Some(5));
+        assert_eq!(arrivals.count(period, seconds(12), resumed), Some(0));
+    }
+
+    #[test]
+    fn a_lifecycle_node_that_does_not_answer_has_failed() {
+        let start = Instant::now();
+        let at = |seconds| start + Duration::from_secs(seconds);
+        let (first, second) = (BTreeSet::from([[1; 16]]), BTreeSet::from([[2; 16]]));
+        let mut queries = StateQueries { servers: BTreeSet::new(), answered: start, unanswered: 0 };
+        assert!(queries.is_due(&first, at(0)));
+        assert_eq!(queries.note(first.clone(), None, at(2)), None, "the first query may be lost");
+        assert_eq!(queries.note(first.clone(), Some(true), at(3)), Some(true));
+        assert!(!queries.is_due(&first, at(7)));
+        assert!(queries.is_due(&first, at(8)), "an event may be lost");
+        assert_eq!(queries.note(first.clone(), Some(false), at(8)), Some(false));
+        assert_eq!(queries.note(first, Some(true), at(13)), Some(true));
+        // The node has been started again and does not answer.
+        for (seconds, expected) in [(14, None), (16, Some(false)), (18, Some(false))] {
+            assert!(queries.is_due(&second, at(seconds)));
+            assert_eq!(queries.note(second.clone(), None, at(seconds)), expected);
+        }
+        assert_eq!(queries.note(second, Some(true), at(20)), Some(true));
+    }
 
     #[test]
     fn the_last_message_is_read_even_if_it_follows_a_report_at_once() {
