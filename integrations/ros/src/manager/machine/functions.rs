@@ -113,6 +113,14 @@ impl Machine {
                 self.failed(&function, effect, Some(self.now + REFUSED_RETRY_DELAY));
                 because
             }
+            Outcome::NotUndone(outcome) => {
+                self.grants.remove(&function);
+                self.modes.insert(function.clone(), String::new());
+                // The failure is reported afterwards, so that the loop does not assume the previous design for its next
+                // decision.
+                self.queue(&Event::Observed { function, design: None });
+                self.changed(change, *outcome)
+            }
         }
     }
 

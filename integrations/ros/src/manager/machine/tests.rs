@@ -546,3 +546,30 @@ fn a_function_without_steps_for_its_idle_time_keeps_its_design() {
     let outputs = robot.obey(outputs);
     assert!(outputs.contains(&Output::Reply(8, true)), "{outputs:?}");
 }
+
+#[test]
+fn a_design_is_requested_again_after_steps_that_were_not_undone() {
+    for (is_undone, expected) in [(true, &[][..]), (false, &[(PATH, "fd_spiral_medium")])] {
+        let mut robot = with_steps();
+        let outputs = robot.request("search_pipeline");
+        let is_path = |output: &Output| matches!(output, Output::Change(change) if change.function == PATH);
+        let high = outputs.iter().find(|output| is_path(output)).expect("a change").clone();
+        let mut remaining: Vec<Output> = outputs.into_iter().filter(|output| !is_path(output)).collect();
+        let failed = || Outcome::StepFailed("/fd_spiral_high has refused".to_owned());
+        remaining.extend(robot.answer(&high, failed()));
+        assert_eq!(performed(&robot.obey(remaining)), ["search_pipeline"]);
+        // The medium spiral is in effect, and the high one is tried again.
+        robot.now += Duration::from_secs(61);
+        let outputs = robot.handle(Input::Tick);
+        assert_eq!(changes(&outputs), [(PATH, "fd_spiral_high")]);
+        let high = outputs.iter().find(|output| is_path(output)).expect("a change").clone();
+        let outcome = if is_undone { failed() } else { Outcome::NotUndone(Box::new(failed())) };
+        let outputs = robot.answer(&high, outcome);
+        assert_eq!(changes(&outputs), expected);
+        assert_eq!(robot.machine.state(), if is_undone { State::Execute } else { State::Reconfigure });
+        robot.obey(outputs);
+        assert_eq!(robot.machine.state(), State::Execute);
+        let configuration = robot.machine.control().beliefs().configuration();
+        assert_eq!(configuration.get(PATH).map(String::as_str), Some("fd_spiral_medium"));
+    }
+}
