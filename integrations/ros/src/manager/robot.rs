@@ -247,6 +247,11 @@ impl Robot {
                         procedure::Outcome::Failed(because) => Outcome::StepFailed(because),
                         procedure::Outcome::Silent(because) => Outcome::Failed(because),
                     };
+                    let outcome = if procedures.is_in_no_mode(&change.function) {
+                        Outcome::NotUndone(Box::new(outcome))
+                    } else {
+                        outcome
+                    };
                     let _ = inputs.send(Input::Changed(change, outcome));
                 })
                 .detach();

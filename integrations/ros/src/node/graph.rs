@@ -360,6 +360,18 @@ impl Graph {
         state.endpoints.iter().filter(|(_, endpoint)| fits(endpoint)).map(|(guid, _)| *guid).collect()
     }
 
+    /// Returns the GUIDs of the request readers of a service's servers. A reader whose participant has no reply writer
+    /// is no server.
+    pub(crate) fn servers(&self, topics: &Topics) -> BTreeSet<[u8; 16]> {
+        let mut servers = self.readers(&topics.requests);
+        let state = self.state();
+        let is_writer = |endpoint: &Endpoint| !endpoint.is_reader && endpoint.topic == topics.replies;
+        let writers = state.endpoints.iter().filter(|(_, endpoint)| is_writer(endpoint));
+        let participants: BTreeSet<&[u8]> = writers.map(|(guid, _)| &guid[..12]).collect();
+        servers.retain(|guid| participants.contains(&guid[..12]));
+        servers
+    }
+
     /// Returns the number of readers of a topic, given by its DDS name, that a writer of ours has matched.
     pub(crate) fn matched_readers(&self, topic: &str) -> usize {
         let readers = self.readers(topic);

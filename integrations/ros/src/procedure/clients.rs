@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::process::Stdio;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
 use metaplan::message::Message;
@@ -57,14 +57,65 @@ struct NodeClient {
     get_parameters: Caller<GetParameters>,
 }
 
-/// Last published message on a topic, with the time of its publication. If that is unknown, with the time of its
-/// arrival.
-type LastMessage = Arc<Mutex<Option<(SystemTime, Vec<u8>)>>>;
+/// Time after the first message on a topic in which latched messages of its publishers arrive, in any order.
+const HISTORY_TIME: Duration = Duration::from_secs(5);
+
+/// Maximum difference between the clocks of the hosts that publish on a topic.
+const MAX_CLOCK_DIFFERENCE: Duration = Duration::from_secs(60);
+
+/// Last message on a topic.
+#[derive(Debug, Default)]
+struct LastMessage {
+    /// Arrival of the first message.
+    first: Option<Instant>,
+    last: Option<TimedMessage>,
+}
+
+#[derive(Debug)]
+struct TimedMessage {
+    message: Vec<u8>,
+    /// Time of the publication by the clock of the publisher. If it is unknown, the time of the arrival.
+    published: SystemTime,
+    is_ours: bool,
+}
+
+impl LastMessage {
+    /// Records a message that arrives at the times `arrival` and `now` of our clocks. It replaces the last one, unless
+    /// it is a latched message that was published before the last one.
+    ///
+    /// The clocks of hosts differ, so the times of publication alone do not determine the order.
+    fn receive(&mut self, message: Vec<u8>, published: SystemTime, arrival: Instant, now: SystemTime) {
+        let first = *self.first.get_or_insert(arrival);
+        let is_at_start = arrival.saturating_duration_since(first) < HISTORY_TIME;
+        // A publisher that is discovered late sends its latched message late.
+        let is_old = now.duration_since(published).is_ok_and(|age| age > MAX_CLOCK_DIFFERENCE);
+        let precedes =
+            |last: &TimedMessage| published < last.published && (is_old || is_at_start && !last.is_ours);
+        if !self.last.as_ref().is_some_and(precedes) {
+            self.last = Some(TimedMessage { message, published, is_ours: false });
+        }
+    }
+
+    /// Records a message that this program publishes at the time `now`.
+    fn send(&mut self, message: Vec<u8>, now: SystemTime) {
+        self.last = Some(TimedMessage { message, published: now, is_ours: true });
+    }
+
+    fn message(&self) -> Option<Vec<u8>> {
+        self.last.as_ref().map(|last| last.message.clone())
+    }
+}
 
 struct Observed {
-    last: LastMessage,
+    last: Arc<Mutex<LastMessage>>,
     /// Exists if a step or an undo publishes on the topic.
     publisher: Option<Publisher<Raw>>,
+}
+
+impl Observed {
+    fn last(&self) -> MutexGuard<'_, LastMessage> {
+        self.last.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 pub(super) struct Clients {
@@ -142,10 +193,11 @@ impl Clients {
     fn observe(&mut self, topic: &str, kind: &Arc<MessageType>) -> Result<&mut Observed, Message> {
         let key = topic_key(topic, kind);
         if !self.observed.contains_key(&key) {
-            let last = LastMessage::default();
-            let noted = Arc::clone(&last);
+            let last: Arc<Mutex<LastMessage>> = Arc::default();
+            let received = Arc::clone(&last);
             self.node.subscribe_when_published(topic, kind, move |message, published| {
-                note_message(&noted, published, message);
+                let mut last = received.lock().unwrap_or_else(PoisonError::into_inner);
+                last.receive(message, published, Instant::now(), SystemTime::now());
             })?;
             self.observed.insert(key.clone(), Observed { last, publisher: None });
         }
@@ -368,13 +420,13 @@ impl Clients {
             return Err(Failure::Refused(format!("{topic} has no publisher")));
         };
         self.await_subscribers(topic, subscribers, within).await?;
-        let last = last_message(&observed.last);
+        let last = observed.last().message();
         if last.as_ref() == Some(message) {
             return Ok(());
         }
         before(last);
-        // Noted first, so that a message of another node that is published later replaces it.
-        note_message(&observed.last, SystemTime::now(), message.clone());
+        // Recorded first, so that a message of another node that is published later replaces it.
+        observed.last().send(message.clone(), SystemTime::now());
         publisher.publish(Raw(message.clone()));
         Ok(())
     }
@@ -393,7 +445,7 @@ impl Clients {
     /// Returns `true` if a condition about the last message on a topic holds, and for all other conditions.
     fn is_met(&self, condition: &Condition) -> bool {
         let last = |topic: &str, kind: &MessageType| {
-            self.observed.get(&topic_key(topic, kind)).and_then(|observed| last_message(&observed.last))
+            self.observed.get(&topic_key(topic, kind)).and_then(|observed| observed.last().message())
         };
         match condition {
             Condition::Published(TopicMessage { topic, kind, message }) => {
@@ -456,19 +508,6 @@ impl Clients {
     }
 }
 
-fn note_message(last: &LastMessage, published: SystemTime, message: Vec<u8>) {
-    let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-    // Latched messages of several publishers arrive in any order, so only a newer message replaces the last one.
-    if last.as_ref().is_none_or(|(earlier, _)| *earlier <= published) {
-        *last = Some((published, message));
-    }
-}
-
-fn last_message(last: &LastMessage) -> Option<Vec<u8>> {
-    let last = last.lock().unwrap_or_else(PoisonError::into_inner);
-    last.as_ref().map(|(_, message)| message.clone())
-}
-
 /// Executes a program, and kills it at the deadline. Its output goes to standard error.
 pub(super) async fn execute(words: &[String], deadline: Instant) -> Result<(), Failure> {
     let [program, arguments @ ..] = words else { return Ok(()) };
@@ -510,5 +549,58 @@ fn text(value: &ParameterValue) -> String {
         ParameterValue::Double(number) => number.to_string(),
         ParameterValue::String(text) => format!("{text:?}"),
         other => format!("{other:?}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+    use super::LastMessage;
+
+    /// Checks the last message of a sequence. For each message: the seconds since the start, the difference of our clock
+    /// from the time since the start, the seconds of the publication by the clock of the publisher (`None` for a message
+    /// of this program), and the content.
+    fn check(messages: &[(u64, i64, Option<i64>, u8)], expected: u8) {
+        let start = Instant::now();
+        let clock =
+            |seconds: i64| UNIX_EPOCH + Duration::from_secs(1_000_000_u64.saturating_add_signed(seconds));
+        let mut last = LastMessage::default();
+        for (seconds, offset, published, content) in messages {
+            let now: SystemTime = clock(seconds.cast_signed() + offset);
+            match published {
+                Some(published) => {
+                    let arrival = start + Duration::from_secs(*seconds);
+                    last.receive(vec![*content], clock(*published), arrival, now);
+                }
+                None => last.send(vec![*content], now),
+            }
+        }
+        assert_eq!(last.message(), Some(vec![expected]), "{messages:?}");
+    }
+
+    #[test]
+    fn the_last_message_is_the_one_that_was_published_last() {
+        assert_eq!(LastMessage::default().message(), None);
+        check(&[(0, 0, Some(0), 1), (1, 0, Some(1), 2)], 2);
+        check(&[(0, 0, Some(0), 1), (1, 0, None, 2)], 2);
+        // Latched messages of several publishers arrive in any order; one publisher is discovered late.
+        check(&[(0, 0, Some(-20), 1), (1, 0, Some(-30), 2)], 1);
+        check(&[(0, 0, Some(-30), 1), (1, 0, Some(-20), 2)], 2);
+        check(&[(0, 0, Some(-20), 1), (500, 0, Some(-90), 2)], 1);
+        check(&[(0, 0, None, 1), (1, 0, Some(-90), 2)], 1);
+    }
+
+    #[test]
+    fn clocks_may_differ_and_step_back() {
+        // The clock of the other host is 10 s behind ours.
+        check(&[(0, 0, None, 1), (5, 0, Some(-5), 2)], 2);
+        check(&[(0, 0, Some(-10), 1), (100, 0, None, 2), (105, 0, Some(95), 3)], 3);
+        // It is 10 s, or an hour, ahead of ours.
+        check(&[(0, 0, Some(10), 1), (2, 0, None, 2)], 2);
+        check(&[(0, 0, Some(3600), 1), (9, 0, None, 2), (60, 0, Some(3660), 3)], 3);
+        // The clock of the only host is set back by an hour.
+        check(&[(0, 0, Some(0), 1), (10, -3600, Some(-3590), 2)], 2);
+        check(&[(0, 0, Some(0), 1), (10, -3600, None, 2), (20, -3600, Some(-3580), 3)], 3);
     }
 }

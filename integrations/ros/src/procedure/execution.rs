@@ -42,8 +42,8 @@ struct FunctionProcedures {
     modes: BTreeMap<String, Procedure>,
     /// Held while a procedure runs, so that procedures of a function never overlap.
     running: smol::lock::Mutex<()>,
-    /// Mode that was put into effect or seen last. `None` once an observation finds the conditions
-    /// of no mode.
+    /// Mode that was put into effect or seen last; `None` before the first one. Empty once an observation finds the
+    /// conditions of no mode, or if failed steps were not undone.
     present: Mutex<Option<String>>,
     /// Modes that could not be put into effect because a node was silent.
     silent: Mutex<BTreeSet<String>>,
@@ -92,6 +92,13 @@ impl Procedures {
     /// Only states, parameters and messages with known content can be observed.
     pub(crate) fn is_unobservable(&self, function: &str) -> bool {
         self.functions.get(function).is_some_and(|procedures| procedures.conditions().next().is_none())
+    }
+
+    /// Returns `true` if a function was last found in none of its modes, or failed steps were not undone, and no mode was
+    /// put into effect or seen since.
+    pub(crate) fn is_in_no_mode(&self, function: &str) -> bool {
+        let present = self.functions.get(function).and_then(FunctionProcedures::present);
+        present.is_some_and(|mode| mode.is_empty())
     }
 
     pub(crate) fn nodes(&self, function: &str) -> BTreeSet<String> {
@@ -170,7 +177,7 @@ impl Procedures {
                 return Seen::Ambiguous;
             }
             [] => {
-                procedures.set_present(None);
+                procedures.set_present("");
                 return Seen::Nothing;
             }
             [(_, mode)] => (*mode).clone(),
@@ -179,7 +186,7 @@ impl Procedures {
                 None => return Seen::Ambiguous,
             },
         };
-        procedures.set_present(Some(observed_mode.clone()));
+        procedures.set_present(&observed_mode);
         Seen::Mode(observed_mode)
     }
 
@@ -230,14 +237,16 @@ impl Procedures {
         let timeout = procedure.timeout.unwrap_or(timeout);
         let mut undos = Vec::new();
         let Err(failure) = run.perform(procedure, Instant::now() + timeout, &mut undos).await else {
-            procedures.set_present(Some(mode.to_owned()));
+            procedures.set_present(mode);
             procedures.silent.lock().unwrap_or_else(PoisonError::into_inner).remove(mode);
             return Outcome::Done;
         };
         // A silent node must not use up the time for restoring the other nodes.
         let first =
             if matches!(failure, Failure::Silent(_)) { timeout.min(OBSERVATION_TIMEOUT) } else { timeout };
-        run.roll_back(undos, first, timeout).await;
+        if !run.roll_back(undos, first, timeout).await {
+            procedures.set_present("");
+        }
         let because = failure.because().to_owned();
         match failure {
             Failure::Silent(_) => {
@@ -258,8 +267,8 @@ impl FunctionProcedures {
         self.present.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    fn set_present(&self, mode: Option<String>) {
-        *self.present.lock().unwrap_or_else(PoisonError::into_inner) = mode;
+    fn set_present(&self, mode: &str) {
+        *self.present.lock().unwrap_or_else(PoisonError::into_inner) = Some(mode.to_owned());
     }
 }
 
@@ -375,22 +384,28 @@ impl Run<'_> {
     }
 
     /// Undoes steps in reverse order, with the timeout `first` for the first undo, and `other` for each further one.
-    /// A step that cannot be undone does not stop the others.
-    async fn roll_back(&self, undos: Vec<Undo>, first: Duration, other: Duration) {
+    /// A step that cannot be undone does not stop the others. Returns `true` if all steps were undone.
+    async fn roll_back(&self, undos: Vec<Undo>, first: Duration, other: Duration) -> bool {
+        let mut is_undone = true;
         for (index, undo) in undos.into_iter().rev().enumerate() {
             let deadline = Instant::now() + if index == 0 { first } else { other };
             match undo {
-                Undo::Impossible(text) => self.warn(&format!("{text}: it is not undone")),
+                Undo::Impossible(text) => {
+                    self.warn(&format!("{text}: it is not undone"));
+                    is_undone = false;
+                }
                 Undo::Operation(operation) => {
                     let outcome = self.step(&operation, None, deadline, &mut Vec::new()).await;
                     let word = if outcome.is_ok() { "undone" } else { "not_undone" };
                     self.report(&operation, word, outcome.as_ref().err());
                     if let Err(failure) = outcome {
                         self.warn(&format!("{operation} could not be restored: {}", failure.because()));
+                        is_undone = false;
                     }
                 }
             }
         }
+        is_undone
     }
 
     fn warn(&self, text: &str) {
@@ -414,5 +429,70 @@ fn undo_of(operation: &Operation, undo: Option<&Operation>) -> Undo {
     match undo {
         Some(undo) => Undo::Operation(undo.clone()),
         None => Undo::Impossible(format!("{operation} has no `undo`")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+    use std::time::Duration;
+
+    use super::{Outcome, Procedures, Seen};
+    use crate::node::{Network, Node, Opening, Rmw, RosArguments};
+    use crate::procedure::Procedure;
+
+    const FUNCTION: &str = "f_grip";
+
+    /// Steps of the designs of a gripper, and the mode in which their failure leaves a gripper with a vacuum.
+    const DESIGNS: [(&str, &str, Option<&str>); 6] = [
+        ("fd_vacuum", r#"[{ command = ["true"] }]"#, None),
+        ("fd_magnet", r#"[{ command = ["true"] }, { command = ["false"] }]"#, Some("")),
+        (
+            "fd_clamp",
+            r#"[{ command = ["true"], undo = { command = ["true"] } }, { command = ["false"] }]"#,
+            Some("fd_vacuum"),
+        ),
+        (
+            "fd_hook",
+            r#"[{ command = ["true"], undo = { command = ["false"] } }, { command = ["false"] }]"#,
+            Some(""),
+        ),
+        ("fd_glue", r#"[{ command = ["false"] }]"#, Some("fd_vacuum")),
+        ("fd_rope", r#"[{ command = ["true"] }, { command = ["sleep", "9"] }]"#, Some("")),
+    ];
+
+    fn procedures() -> Procedures {
+        let words = ["p".to_owned(), "--ros-args".to_owned()];
+        let (_, arguments) = RosArguments::split(words).expect("arguments");
+        let network = Network { domain: 11, loopback: true };
+        let opening = Opening { name: "gripper".to_owned(), arguments, network, rmw: Rmw::Auto };
+        let node = Node::open(opening).expect("a node");
+        let modes = DESIGNS.map(|(design, steps, _)| {
+            let procedure: Procedure =
+                toml::from_str(&format!("steps = {steps}\ntimeout = 0.5")).expect("steps");
+            (design.to_owned(), procedure)
+        });
+        let functions = [(FUNCTION.to_owned(), modes.into())];
+        Procedures::new(&node, functions.into(), |_| {}).expect("clients")
+    }
+
+    #[test]
+    fn a_function_has_no_mode_after_steps_that_were_not_undone() {
+        let procedures = procedures();
+        let apply = |design: &str| {
+            let is_replaced = AtomicBool::new(false);
+            smol::block_on(procedures.apply(FUNCTION, design, Duration::from_secs(5), &is_replaced))
+        };
+        let observe = || smol::block_on(procedures.observe(FUNCTION));
+        assert_eq!(observe(), Seen::Ambiguous);
+        for (design, _, mode) in DESIGNS {
+            assert_eq!(apply("fd_vacuum"), Outcome::Done);
+            assert_eq!(observe(), Seen::Mode("fd_vacuum".to_owned()));
+            let Some(mode) = mode else { continue };
+            assert!(matches!(apply(design), Outcome::Failed(_) | Outcome::Silent(_)), "{design}");
+            let expected = if mode.is_empty() { Seen::Nothing } else { Seen::Mode(mode.to_owned()) };
+            assert_eq!(observe(), expected, "{design}");
+            assert_eq!(procedures.is_in_no_mode(FUNCTION), mode.is_empty(), "{design}");
+        }
     }
 }

@@ -145,6 +145,67 @@ fn goals_are_pursued_cancelled_and_rejected() {
     );
 }
 
+/// Returns the next message of a channel, or `None` after [`LONG`].
+fn next<T>(messages: &smol::channel::Receiver<T>) -> Option<T> {
+    block_on(smol::future::or(async { messages.recv().await.ok() }, async {
+        smol::Timer::after(LONG).await;
+        None
+    }))
+}
+
+#[test]
+fn a_goal_that_is_accepted_late_is_cancelled() {
+    let domain = domain();
+    let (server, client) = (node(domain, "server", ""), node(domain, "client", ""));
+    let (sender, events) = smol::channel::unbounded();
+    let goals = server
+        .serve_action::<ControlQos>("/mros/objective", move |event| {
+            sender.try_send(event).expect("the test receives");
+        })
+        .expect("an action");
+    let caller = client.action_caller::<ControlQos>("/mros/objective");
+    // The server is discovered, and does not answer the second goal in time.
+    let pursuing = std::thread::spawn(move || {
+        let first = block_on(caller.pursue(ControlQosGoal::default(), LONG));
+        let second = block_on(caller.pursue(ControlQosGoal::default(), Duration::from_millis(500)));
+        (caller, first.expect("accepted"), second.expect_err("no answer").to_string())
+    });
+    let Some(GoalEvent::Wanted(request, _)) = next(&events) else { panic!("a goal is wanted") };
+    goals.accept(request);
+    let Some(GoalEvent::Wanted(request, _)) = next(&events) else { panic!("a goal is wanted") };
+    let (_caller, _first, error) = pursuing.join().expect("no panic");
+    assert!(error.contains("no answer to a goal after 0.5 s"), "{error}");
+    let late = goals.accept(request);
+    let Some(GoalEvent::Cancel(goal, _)) = next(&events) else { panic!("a goal is to be cancelled") };
+    assert_eq!(goal, late);
+}
+
+#[test]
+fn a_goal_is_lost_if_its_server_is_replaced() {
+    let domain = domain();
+    let (server, client) = (node(domain, "server", ""), node(domain, "client", ""));
+    let (sender, events) = smol::channel::unbounded();
+    let goals = server
+        .serve_action::<ControlQos>("/mros/objective", move |event| {
+            sender.try_send(event).expect("the test receives");
+        })
+        .expect("an action");
+    let caller = client.action_caller::<ControlQos>("/mros/objective");
+    let pursuing = std::thread::spawn(move || {
+        let pursued = block_on(caller.pursue(ControlQosGoal::default(), LONG)).expect("accepted");
+        (caller, pursued)
+    });
+    let Some(GoalEvent::Wanted(request, _)) = next(&events) else { panic!("a goal is wanted") };
+    goals.accept(request);
+    let (_caller, pursued) = pursuing.join().expect("no panic");
+    // The endpoints of a server that has crashed remain until their lease expires, in addition to those of the next server.
+    let respawned = node(domain, "server", "");
+    respawned.serve_action::<ControlQos>("/mros/objective", |_| {}).expect("an action");
+    let lost = "the server of /mros/objective is gone".to_owned();
+    assert_eq!(next(&pursued.events), Some(Accepted::Lost(lost)));
+    let Some(GoalEvent::Cancel(..)) = next(&events) else { panic!("a server that goes on is to stop") };
+}
+
 #[test]
 fn parameters_are_declared_listed_and_set() {
     let domain = domain();

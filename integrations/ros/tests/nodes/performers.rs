@@ -163,6 +163,24 @@ fn nav2_moves_the_robot() {
 }
 
 #[test]
+fn a_result_of_another_version_ends_the_action() {
+    use humble::nav2_msgs::action::{NavigateToPose, NavigateToPoseFeedback, NavigateToPoseResult};
+
+    let domain = domain();
+    let robot = node(domain, "robot", "");
+    serve::<NavigateToPose>(&robot, "/navigate_to_pose", NavigateToPoseFeedback::default(), |_| {
+        Some((GoalEnd::Succeeded, NavigateToPoseResult::default()))
+    });
+    let (_manager, cast) = cast(domain, SETTINGS);
+    let running = cast.start(call("(move r1 kitchen hall)"));
+    let moving = std::thread::spawn(move || hear(&running).1);
+    until("the end", || moving.is_finished());
+    let end = moving.join().expect("no panic");
+    let expected = "a result of /navigate_to_pose is malformed";
+    assert!(matches!(&end, End::Failed(because) if because.contains(expected)), "{end:?}");
+}
+
+#[test]
 fn the_world_and_the_modes_of_functions_do_their_part() {
     let domain = domain();
     let robot = node(domain, "robot", "");

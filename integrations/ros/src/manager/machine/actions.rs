@@ -22,11 +22,13 @@ impl Machine {
             return;
         }
         let Some(action) = self.action.as_mut().filter(|action| !action.begun) else { return };
-        action.begun = true;
+        (action.begun, action.is_lost) = (true, false);
         let (number, effect, call) = (action.number, action.effect, action.call.clone());
         self.outputs.push(Output::Perform(number, call));
-        self.lines.push_back(Event::Acknowledged { effect }.to_json().to_string());
-        self.lines.push_back(Event::Started { action: number }.to_json().to_string());
+        if let Some(effect) = effect {
+            self.acknowledge(effect);
+            self.queue(&Event::Started { action: number });
+        }
     }
 
     /// Ends the action under way if the loop has suspended it. Performers cannot pause, and an action that goes on
@@ -45,10 +47,16 @@ impl Machine {
             return format!("action {number} has ended before");
         }
         self.action = None;
+        let is_ending = self.ending.is_some();
         match ended {
             Ended::Succeeded => self.queue(&Event::Succeeded { action: number }),
+            // The failure of an action that should end anyway does not count.
+            Ended::Failed(_) if is_ending => self.queue(&Event::Cancelled { action: number }),
             Ended::Cancelled => self.queue(&Event::Cancelled { action: number }),
             Ended::Failed(reason) => self.queue(&Event::Failed { action: number, reason: reason.clone() }),
+        }
+        if is_ending {
+            self.unground_all();
         }
         format!("action {number} has ended")
     }

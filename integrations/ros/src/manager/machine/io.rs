@@ -55,6 +55,8 @@ pub(in crate::manager) enum Outcome {
     Failed(String),
     /// A step or condition has failed for this reason, and the earlier steps were undone as far as possible.
     StepFailed(String),
+    /// The outcome of steps that have failed and of which some were not undone: the function is in none of its modes.
+    NotUndone(Box<Outcome>),
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]

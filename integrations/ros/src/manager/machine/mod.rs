@@ -31,11 +31,13 @@ const EMPTY_GOAL: &str = "(and)";
 struct Action {
     number: u64,
     call: Call,
-    effect: u64,
+    /// Effect that requests the action. `None` for an action that the previous run has begun.
+    effect: Option<u64>,
     begun: bool,
     /// `true` for an action of the previous run until it is performed again.
     is_lost: bool,
-    /// `true` once a request to end the action was sent to the performer because the loop has suspended it.
+    /// `true` once a request to end the action was sent to the performer, because the loop has suspended the action or
+    /// the task has ended.
     is_stopped: bool,
 }
 
@@ -72,6 +74,8 @@ pub(super) struct Machine {
     modes: BTreeMap<String, String>,
     grants: BTreeMap<String, Grant>,
     action: Option<Action>,
+    /// Time until which the end of the task waits for the end of the action.
+    ending: Option<Duration>,
     start_requests: Vec<u64>,
     end_requests: Vec<u64>,
     failures: BTreeMap<String, CallFailures>,
@@ -104,6 +108,7 @@ impl Machine {
             modes: BTreeMap::new(),
             grants: BTreeMap::new(),
             action: None,
+            ending: None,
             start_requests: Vec::new(),
             end_requests: Vec::new(),
             failures: BTreeMap::new(),
@@ -177,8 +182,10 @@ impl Machine {
             self.catch_up();
             self.settle()?;
         }
-        self.repeat_action();
-        self.begin();
+        if self.deferred.is_none() {
+            self.end_lost_action();
+            self.begin();
+        }
         self.settle()?;
         self.stop_suspended();
         self.enter(&because)?;
@@ -312,7 +319,7 @@ impl Machine {
                 self.action = Some(Action {
                     number: effect.action,
                     call,
-                    effect: effect.number,
+                    effect: Some(effect.number),
                     begun: false,
                     is_lost: false,
                     is_stopped: false,

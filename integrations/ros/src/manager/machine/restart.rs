@@ -7,8 +7,8 @@ use std::time::Duration;
 use metaplan::mapek::{Command, Effect, Event};
 use metaplan::message::Message;
 
-use crate::manager::machine::io::{Output, State};
-use crate::manager::machine::{Action, Deferred, Machine, call, unwritten};
+use crate::manager::machine::io::State;
+use crate::manager::machine::{Action, Deferred, EMPTY_GOAL, Machine, call, unwritten};
 
 /// Time to wait for new diagnostics after a restart, before the modes found at the start are evaluated. Without the wait,
 /// they would be evaluated with old diagnostics.
@@ -63,34 +63,33 @@ impl Machine {
         }
     }
 
+    /// Restores the action of the previous run. [`begin`](Self::begin) performs it again once the functions have their
+    /// designs, because its performer may have lost it. For an action that ends with a message on a topic, this has no
+    /// disadvantage.
     fn restore_action(&mut self) {
         let Some((number, step)) = self.control.beliefs().running() else { return };
         let call = call(step);
         let is_waiting = |effect: &&Effect| matches!(effect.command, Command::Request { .. });
         let effect = self.control.beliefs().outstanding().find(is_waiting).map(|effect| effect.number);
-        let begun = effect.is_none();
-        let effect = effect.unwrap_or_default();
-        self.action = Some(Action { number, call, effect, begun, is_lost: true, is_stopped: false });
+        self.action = Some(Action { number, call, effect, begun: false, is_lost: true, is_stopped: false });
     }
 
-    /// Performs the begun action of the previous run again, because its performer may have lost it, unless a queued
-    /// line has ended the action. For an action that ends with a message on a topic, this has no disadvantage. A
-    /// cancelled or suspended action counts as cancelled: no performer can report its end any more.
-    pub(super) fn repeat_action(&mut self) {
+    /// Drops the action of the previous run if it has ended or must not be performed again. A cancelled or suspended
+    /// action, and that of an ended task, count as cancelled: no performer can report their end any more.
+    pub(super) fn end_lost_action(&mut self) {
         let beliefs = self.control.beliefs();
         let running = beliefs.running().map(|(number, _)| number);
         let is_interrupted = beliefs.cancelling() || beliefs.suspended();
-        let Some(action) = self.action.as_mut().filter(|action| action.is_lost) else { return };
-        action.is_lost = false;
-        if running != Some(action.number) {
-            return;
-        }
-        let Action { number, begun, .. } = *action;
-        if is_interrupted {
+        let is_of_ended_task = beliefs.goal() == Some(EMPTY_GOAL);
+        let lost = self.action.as_ref().filter(|action| action.is_lost);
+        let Some(number) = lost.map(|action| action.number) else { return };
+        if running != Some(number) {
+            self.action = None;
+        } else if is_of_ended_task {
+            self.end_action();
+        } else if is_interrupted {
             self.action = None;
             self.queue(&Event::Cancelled { action: number });
-        } else if begun {
-            self.outputs.push(Output::Perform(number, action.call.clone()));
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Requests to start and end tasks, and the replies. A task ends if a client cancels it or requests another task, if
 //! its goal is reached, or if the autopilot leaves its mode.
 
+use std::time::Duration;
+
 use metaplan::mapek::Event;
 use metaplan::message::did_you_mean;
 use serde_json::json;
@@ -9,9 +11,13 @@ use crate::manager::machine::io::{Output, State};
 use crate::manager::machine::{EMPTY_GOAL, Machine};
 use crate::manager::settings::fact_value;
 
+/// Time to wait for the end of the action of a task that has ended. Clients such as SUAVE's mission node wait five
+/// seconds for the reply.
+const STOP_WAIT: Duration = Duration::from_secs(3);
+
 impl Machine {
     pub(super) fn reply(&mut self) {
-        if !self.pending.is_empty() {
+        if !self.pending.is_empty() || self.ending.is_some() {
             return;
         }
         let granted = self.task.is_some() && !self.without_plan;
@@ -44,6 +50,8 @@ impl Machine {
         self.start_requests.push(number);
         if self.task.as_deref() != Some(task) {
             self.task = Some(task.to_owned());
+            // The loop waits for the end of the previous task's action.
+            self.ending = None;
             for (name, value) in &settings.facts {
                 self.queue(&Event::Fact { name: name.clone(), value: fact_value(value) });
             }
@@ -77,16 +85,47 @@ impl Machine {
         if self.task.take().is_some() {
             self.queue(&Event::Goal { goal: EMPTY_GOAL.to_owned() });
         }
-        if let Some(action) = self.action.take() {
-            self.outputs.push(Output::Stop(action.number));
+        match self.action.as_mut().filter(|action| action.begun) {
+            // The robot needs the functions until the performer reports the end.
+            Some(action) => {
+                action.is_stopped = true;
+                self.outputs.push(Output::Stop(action.number));
+                self.ending.get_or_insert(self.now + STOP_WAIT);
+            }
+            None => self.end_action(),
         }
+        format!("the task {task} ends")
+    }
+
+    /// Ends the action of a task that has ended, and withdraws the designs of all functions.
+    pub(super) fn end_action(&mut self) {
+        self.action = None;
         if let Some((action, _)) = self.control.beliefs().running() {
             self.queue(&Event::Cancelled { action });
         }
+        self.unground_all();
+    }
+
+    pub(super) fn unground_all(&mut self) {
+        self.ending = None;
         for function in self.functions.clone() {
             self.unground(&function);
         }
-        format!("the task {task} ends")
+    }
+
+    /// Ends an action whose performer has not reported its end in time after the end of the task.
+    pub(super) fn abandon_action(&mut self) {
+        if self.ending.is_none_or(|until| until > self.now) {
+            return;
+        }
+        for number in std::mem::take(&mut self.end_requests) {
+            self.outputs.push(Output::Reply(number, false));
+        }
+        let action = self.action.as_ref().map(|action| action.call.text()).unwrap_or_default();
+        self.outputs.push(Output::Warn(format!(
+            "{action} was cancelled, but its performer has not reported the end"
+        )));
+        self.end_action();
     }
 
     pub(super) fn reached(&mut self) {
@@ -101,9 +140,7 @@ impl Machine {
         if self.control.beliefs().goal().is_some_and(|goal| goal != EMPTY_GOAL) {
             self.queue(&Event::Goal { goal: EMPTY_GOAL.to_owned() });
         }
-        for function in self.functions.clone() {
-            self.unground(&function);
-        }
+        self.unground_all();
     }
 
     pub(super) fn autopilot(&mut self, mode: &str) -> String {

@@ -97,6 +97,10 @@ impl Robot {
         self.handle(Input::Request(7, task.to_owned()))
     }
 
+    fn cancel(&mut self, task: &str) -> Vec<Output> {
+        self.handle(Input::Cancel(8, task.to_owned()))
+    }
+
     fn measure(&mut self, attribute: &str, value: &str) -> Vec<Output> {
         self.handle(Input::Line(format!(
             r#"{{"event":"measured","attribute":"{attribute}","value":{value}}}"#
@@ -138,11 +142,71 @@ fn a_task_is_granted_when_its_functions_have_their_designs() {
     assert!(last.contains(&Output::Reply(7, true)), "{last:?}");
     assert_eq!(robot.machine.state(), State::Execute);
     // The end of the task withdraws all designs. The client receives the reply when this is done.
-    let outputs = robot.handle(Input::Cancel(8, "search_pipeline".to_owned()));
+    assert_eq!(robot.cancel("search_pipeline"), [Output::Stop(1)]);
+    let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     let outputs = robot.obey(outputs);
     assert!(outputs.contains(&Output::Reply(8, true)), "{outputs:?}");
     assert_eq!(robot.machine.state(), State::Idle);
+}
+
+/// Creates a robot that searches, and whose performer was requested to stop because the task was cancelled.
+fn stopping(journal: Option<&Path>) -> Robot {
+    let mut robot = Robot::new(journal);
+    let outputs = robot.request("search_pipeline");
+    assert_eq!(performed(&robot.obey(outputs)), ["search_pipeline"]);
+    assert_eq!(robot.cancel("search_pipeline"), [Output::Stop(1)]);
+    robot
+}
+
+#[test]
+fn functions_keep_their_designs_until_the_action_of_a_cancelled_task_has_ended() {
+    let failed = || Ended::Failed("its server has aborted the goal".to_owned());
+    for ended in [Ended::Succeeded, Ended::Cancelled, failed()] {
+        let mut robot = stopping(None);
+        robot.now += Duration::from_secs(2);
+        assert_eq!(robot.handle(Input::Tick), []);
+        assert_eq!(robot.machine.state(), State::Execute);
+        let outputs = robot.handle(Input::Performed(1, ended));
+        assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+        let outputs = robot.obey(outputs);
+        assert_eq!(outputs, [Output::Reply(8, true)]);
+        assert_eq!(robot.machine.state(), State::Idle);
+    }
+    // The performer does not stop.
+    let mut robot = stopping(None);
+    robot.now += Duration::from_secs(3);
+    let outputs = robot.handle(Input::Tick);
+    assert_eq!(outputs[0], Output::Reply(8, false));
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+    robot.obey(outputs);
+    assert_eq!(robot.machine.state(), State::Idle);
+    assert_eq!(robot.handle(Input::Performed(1, failed())), []);
+}
+
+#[test]
+fn a_new_task_waits_for_the_end_of_the_cancelled_action() {
+    let mut robot = stopping(None);
+    let outputs = robot.request("inspect_pipeline");
+    assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
+    robot.now += Duration::from_secs(9);
+    let outputs = robot.handle(Input::Tick);
+    assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
+    let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
+    assert_eq!(performed(&robot.obey(outputs)), ["inspect_pipeline"]);
+}
+
+#[test]
+fn the_action_of_a_cancelled_task_is_not_repeated_after_a_restart() {
+    let directory = tempfile::tempdir().expect("a directory");
+    drop(stopping(Some(directory.path())));
+    let mut robot = Robot::restarted(directory.path());
+    let mut outputs = robot.ready(searching);
+    robot.now += Duration::from_secs(4);
+    outputs.extend(robot.handle(Input::Tick));
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+    assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
+    assert_eq!((robot.machine.state(), robot.machine.task()), (State::Idle, None));
 }
 
 #[test]
@@ -341,6 +405,8 @@ fn a_task_ends_when_the_autopilot_no_longer_obeys() {
     robot.obey(outputs);
     assert_eq!(robot.handle(Input::Autopilot("GUIDED".to_owned())), []);
     let outputs = robot.handle(Input::Autopilot("MANUAL".to_owned()));
+    assert_eq!(outputs, [Output::Stop(1)]);
+    let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     robot.obey(outputs);
     assert_eq!(robot.machine.state(), State::Idle);
@@ -441,7 +507,7 @@ fn a_mode_whose_task_has_ended_is_not_requested_again() {
         .expect("a change");
     robot.answer(path, Outcome::Done);
     // The motion has not answered yet.
-    let outputs = robot.handle(Input::Cancel(8, "search_pipeline".to_owned()));
+    let outputs = robot.cancel("search_pipeline");
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     robot.obey(outputs);
     assert_eq!(robot.machine.control().beliefs().outstanding().count(), 0);
@@ -458,7 +524,7 @@ fn a_task_that_is_cancelled_before_the_functions_are_found_is_not_carried_out() 
     robot.obey(outputs);
     drop(robot);
     let mut robot = Robot::restarted(directory.path());
-    assert_eq!(robot.handle(Input::Cancel(8, "search_pipeline".to_owned())), []);
+    assert_eq!(robot.cancel("search_pipeline"), []);
     let outputs = robot.ready(searching);
     assert_eq!(performed(&outputs), Vec::<&str>::new());
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
@@ -485,6 +551,36 @@ fn an_action_that_was_being_cancelled_is_not_repeated_after_a_restart() {
     robot.now += Duration::from_secs(4);
     outputs.extend(robot.handle(Input::Tick));
     assert_eq!(performed(&robot.obey(outputs)), ["recharge"]);
+}
+
+#[test]
+fn an_action_is_performed_after_a_restart_once_its_functions_have_their_designs() {
+    // All functions have lost their modes, as after a power cycle, or have kept them.
+    for (modes, expected) in [
+        (
+            (|_| "fd_unground") as fn(&str) -> &'static str,
+            &[(PATH, "fd_spiral_high"), (MOTION, "fd_all_thrusters")][..],
+        ),
+        (searching, &[]),
+    ] {
+        let directory = tempfile::tempdir().expect("a directory");
+        let mut robot = Robot::new(Some(directory.path()));
+        let outputs = robot.request("search_pipeline");
+        assert_eq!(performed(&robot.obey(outputs)), ["search_pipeline"]);
+        drop(robot);
+        let mut robot = Robot::restarted(directory.path());
+        let outputs = robot.ready(modes);
+        assert_eq!((performed(&outputs), changes(&outputs)), (vec![], vec![]), "diagnostics may be new");
+        robot.now += Duration::from_secs(4);
+        let outputs = robot.handle(Input::Tick);
+        assert_eq!(changes(&outputs), expected);
+        assert_eq!(performed(&outputs).is_empty(), !expected.is_empty(), "{outputs:?}");
+        assert_eq!(performed(&robot.obey(outputs)), ["search_pipeline"]);
+        assert_eq!(performed(&robot.handle(Input::Tick)), Vec::<&str>::new(), "once");
+        let outputs = robot.handle(Input::Performed(1, Ended::Succeeded));
+        robot.obey(outputs);
+        assert_eq!(robot.machine.state(), State::Idle);
+    }
 }
 
 /// Creates a machine whose spiral has steps for its designs, but none for the time when it is not needed.
@@ -541,8 +637,36 @@ fn a_function_without_steps_for_its_idle_time_keeps_its_design() {
     let mut robot = with_steps();
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
-    let outputs = robot.handle(Input::Cancel(8, "search_pipeline".to_owned()));
+    robot.cancel("search_pipeline");
+    let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
     assert_eq!(changes(&outputs), [(MOTION, "fd_unground")]);
     let outputs = robot.obey(outputs);
     assert!(outputs.contains(&Output::Reply(8, true)), "{outputs:?}");
+}
+
+#[test]
+fn a_design_is_requested_again_after_steps_that_were_not_undone() {
+    for (is_undone, expected) in [(true, &[][..]), (false, &[(PATH, "fd_spiral_medium")])] {
+        let mut robot = with_steps();
+        let outputs = robot.request("search_pipeline");
+        let is_path = |output: &Output| matches!(output, Output::Change(change) if change.function == PATH);
+        let high = outputs.iter().find(|output| is_path(output)).expect("a change").clone();
+        let mut remaining: Vec<Output> = outputs.into_iter().filter(|output| !is_path(output)).collect();
+        let failed = || Outcome::StepFailed("/fd_spiral_high has refused".to_owned());
+        remaining.extend(robot.answer(&high, failed()));
+        assert_eq!(performed(&robot.obey(remaining)), ["search_pipeline"]);
+        // The medium spiral is in effect, and the high one is tried again.
+        robot.now += Duration::from_secs(61);
+        let outputs = robot.handle(Input::Tick);
+        assert_eq!(changes(&outputs), [(PATH, "fd_spiral_high")]);
+        let high = outputs.iter().find(|output| is_path(output)).expect("a change").clone();
+        let outcome = if is_undone { failed() } else { Outcome::NotUndone(Box::new(failed())) };
+        let outputs = robot.answer(&high, outcome);
+        assert_eq!(changes(&outputs), expected);
+        assert_eq!(robot.machine.state(), if is_undone { State::Execute } else { State::Reconfigure });
+        robot.obey(outputs);
+        assert_eq!(robot.machine.state(), State::Execute);
+        let configuration = robot.machine.control().beliefs().configuration();
+        assert_eq!(configuration.get(PATH).map(String::as_str), Some("fd_spiral_medium"));
+    }
 }

@@ -1,13 +1,14 @@
 //! Action clients: sending, monitoring and cancelling goals.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use futures::FutureExt as _;
 use metaplan::message::Message;
 use ros2_client::ActionTypeName;
-use ros2_client::action::{ActionClient, ActionClientQosPolicies, GoalId, GoalStatusEnum};
+use ros2_client::action::{ActionClient, ActionClientQosPolicies, GetResultResponse, GoalId, GoalStatusEnum};
+use ros2_client::action_msgs::CancelGoalResponseEnum;
+use ros2_client::error::WriteResult;
 use ros2_client::request_id::RmwRequestId;
 use smol::{Timer, channel};
 
@@ -22,9 +23,17 @@ use crate::types::{ActionType, AnyAction};
 /// answers would be lost.
 const MATCHING_TIME: Duration = Duration::from_millis(100);
 
-/// Maximum number of consecutive failed look-ups of a server, one per `POLL_INTERVAL`. After more, the server counts
-/// as lost.
-const MAX_FAILED_LOOKUPS: u32 = 250;
+/// Interval between look-ups of the servers of running goals.
+const LOOKUP_INTERVAL: Duration = Duration::from_millis(100);
+
+/// Time for which the server of a goal is missing, or another server is present, after which the goal counts as lost.
+const SERVER_LOSS_TIME: Duration = Duration::from_millis(500);
+
+/// Time to wait for the result of a goal that has ended according to its server.
+const RESULT_WAIT: Duration = Duration::from_secs(3);
+
+/// Time for which a late acceptance of a goal is expected, so that the goal can be cancelled.
+const LATE_ANSWER_WAIT: Duration = Duration::from_secs(15 * 60);
 
 type Client<A> = ActionClient<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
 
@@ -64,18 +73,72 @@ pub struct ActionCaller<A: Action> {
     connection: smol::lock::Mutex<Option<Arc<Connection<A>>>>,
 }
 
-/// A client of a server with its running goals. The client library passes each message to the first
+/// A client of a server with its goals. The client library passes each message to the first
 /// receiver, regardless of the goal, so a single task receives the messages about all goals.
 struct Connection<A: Action> {
     server: Server,
     client: Client<A>,
-    goals: Mutex<BTreeMap<GoalId, Followed<A>>>,
+    goals: Mutex<ClientGoals<A>>,
+}
+
+struct ClientGoals<A: Action> {
+    /// Goals that the server has neither accepted nor rejected.
+    unanswered: Vec<Unanswered<A>>,
+    accepted: BTreeMap<GoalId, Followed<A>>,
+    /// Description of the last result that could not be decoded.
+    malformed: Option<String>,
+}
+
+struct Unanswered<A: Action> {
+    request: RmwRequestId,
+    goal: GoalId,
+    since: Instant,
+    /// Closed if the sender of the goal no longer waits.
+    answer: channel::Sender<Result<Pursued<A>, GoalError>>,
 }
 
 struct Followed<A: Action> {
     result: RmwRequestId,
     events: channel::Sender<Accepted<A>>,
     cancelled: channel::Receiver<()>,
+    /// Last request to cancel the goal.
+    cancel: Option<RmwRequestId>,
+    prospect: Prospect,
+}
+
+/// Facts that determine whether the result of an accepted goal can still arrive.
+#[derive(Debug)]
+struct Prospect {
+    /// Servers of the action when the goal was accepted. One of them has accepted it.
+    servers: BTreeSet<[u8; 16]>,
+    /// Time since which these servers are missing, or another server is present.
+    changed: Option<Instant>,
+    /// Time since which the goal has ended according to its status, or is unknown to the server.
+    ended: Option<Instant>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Loss {
+    Server,
+    Result,
+}
+
+impl Prospect {
+    /// Returns the reason why the result can no longer be expected, if there is one. `servers` are the present servers.
+    ///
+    /// A new server replaces one that has crashed and whose endpoints remain until their lease expires. It does not
+    /// have the goals of the other one.
+    fn loss(&mut self, servers: &BTreeSet<[u8; 16]>, now: Instant) -> Option<Loss> {
+        let is_changed = servers.is_empty() || !servers.is_subset(&self.servers);
+        self.changed = is_changed.then(|| self.changed.unwrap_or(now));
+        let is_over = |since: Option<Instant>, limit: Duration| {
+            since.is_some_and(|since| now.saturating_duration_since(since) >= limit)
+        };
+        if is_over(self.ended, RESULT_WAIT) {
+            return Some(Loss::Result);
+        }
+        is_over(self.changed, SERVER_LOSS_TIME).then_some(Loss::Server)
+    }
 }
 
 /// A goal that an action server has accepted.
@@ -108,63 +171,57 @@ impl<A: Action> std::fmt::Debug for ActionCaller<A> {
 
 impl<A: Action + 'static> ActionCaller<A> {
     /// Sends a goal, and waits until the server accepts it. `within` limits the time to wait for a
-    /// server and its answer.
+    /// server and its answer. A goal without an answer in time is cancelled, even if it is accepted later.
     ///
     /// # Errors
     /// Fails if no server of the expected type accepts the goal in time.
     pub async fn pursue(&self, goal: A::Goal, within: Duration) -> Result<Pursued<A>, GoalError> {
         let start = Instant::now();
-        let unreachable = |because: String| GoalError::Unreachable { action: self.full.clone(), because };
-        // The lock is held until the answer arrives: of two concurrent receivers, one could take the answer to the
-        // other's goal.
-        let mut connection = self.connection.lock().await;
-        let connection = self.connect(&mut connection, within).await.map_err(unreachable)?;
-        let (client, mapping) = (&connection.client, connection.server.mapping);
-        let remaining = within.saturating_sub(start.elapsed());
-        let mut timer = futures::FutureExt::fuse(Timer::after(remaining));
-        let mut sent = Box::pin(client.async_send_goal(goal)).fuse();
-        let (id, response) = futures::select! {
-            sent = sent => sent.map_err(|error| unreachable(error.to_string()))?,
-            _ = timer => {
-                let text = format!(
-                    "no answer to a goal after {:.1} s; it was sent with the service mapping of {mapping}; `--rmw {}` \
-                     selects the other mapping",
-                    within.as_secs_f64(),
-                    mapping.other()
-                );
-                return Err(unreachable(text));
-            }
-        };
-        if !response.accepted {
-            return Err(GoalError::Rejected(self.full.clone()));
-        }
-        let result = client.request_result(id).map_err(|error| unreachable(error.to_string()))?;
-        let (sender, events) = channel::unbounded();
-        let (cancel, cancelled) = channel::bounded(1);
-        let is_first = connection.follow(id, Followed { result, events: sender, cancelled });
+        let unreachable = |because: String| unreachable(&self.full, because);
+        let connection = self.connect(within).await.map_err(unreachable)?;
+        let (sender, answer) = channel::bounded(1);
+        let (goal, is_first) =
+            connection.send(goal, sender).map_err(|error| unreachable(error.to_string()))?;
         if is_first {
-            let (graph, full, followed) =
-                (Arc::clone(&self.node.graph), self.full.clone(), Arc::clone(connection));
-            smol::spawn(async move { followed.run(&graph, &full).await }).detach();
+            let (graph, full, running) =
+                (Arc::clone(&self.node.graph), self.full.clone(), Arc::clone(&connection));
+            smol::spawn(async move { running.run(&graph, &full).await }).detach();
         }
-        Ok(Pursued { goal: id, events, cancel })
+        let remaining = within.saturating_sub(start.elapsed());
+        let timeout = async {
+            Timer::after(remaining).await;
+            None
+        };
+        if let Some(answer) = smol::future::or(async { answer.recv().await.ok() }, timeout).await {
+            return answer;
+        }
+        // The server may have accepted the goal, and the robot would then move on its own. Answers that are received from
+        // here on are late.
+        drop(answer);
+        let _ = connection.client.cancel_goal(goal);
+        let mapping = connection.server.mapping;
+        Err(unreachable(format!(
+            "no answer to a goal after {:.1} s; it was sent with the service mapping of {mapping}; `--rmw {}` selects \
+             the other mapping",
+            within.as_secs_f64(),
+            mapping.other()
+        )))
     }
 
-    async fn connect<'c>(
-        &self,
-        connection: &'c mut Option<Arc<Connection<A>>>,
-        within: Duration,
-    ) -> Result<&'c Arc<Connection<A>>, String> {
+    async fn connect(&self, within: Duration) -> Result<Arc<Connection<A>>, String> {
         let topics = goal_topics(&self.full);
+        let mut connection = self.connection.lock().await;
         let discovered = self.node.graph.wait(within, |graph| graph.server(&topics)).await;
         let server =
             discovered.ok_or_else(|| format!("it has no server after {:.1} s", within.as_secs_f64()))??;
-        if connection.as_ref().is_none_or(|connected| connected.server != server) {
-            let client = self.client(server.mapping).map_err(|message| message.message.clone())?;
-            Timer::after(MATCHING_TIME.min(within)).await;
-            *connection = Some(Arc::new(Connection { server, client, goals: Mutex::default() }));
+        if let Some(connected) = connection.as_ref().filter(|connected| connected.server == server) {
+            return Ok(Arc::clone(connected));
         }
-        connection.as_ref().ok_or_else(String::new)
+        let client = self.client(server.mapping).map_err(|message| message.message.clone())?;
+        Timer::after(MATCHING_TIME.min(within)).await;
+        let goals = ClientGoals { unanswered: Vec::new(), accepted: BTreeMap::new(), malformed: None };
+        let connected = Arc::new(Connection { server, client, goals: Mutex::new(goals) });
+        Ok(Arc::clone(connection.insert(connected)))
     }
 
     fn client(&self, mapping: Mapping) -> Result<Client<A>, Message> {
@@ -184,32 +241,36 @@ impl<A: Action + 'static> ActionCaller<A> {
 }
 
 impl<A: Action + 'static> Connection<A> {
-    fn goals(&self) -> MutexGuard<'_, BTreeMap<GoalId, Followed<A>>> {
+    fn goals(&self) -> MutexGuard<'_, ClientGoals<A>> {
         self.goals.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Registers a running goal. Returns `true` if it is the only one, so that a task must be
+    /// Sends a goal. Returns its id, and `true` if it is the only one, so that a task must be
     /// started to receive messages.
-    fn follow(&self, goal: GoalId, followed: Followed<A>) -> bool {
+    fn send(
+        &self,
+        goal: A::Goal,
+        answer: channel::Sender<Result<Pursued<A>, GoalError>>,
+    ) -> WriteResult<(GoalId, bool), ()> {
+        // The lock is held so that the answer cannot be received before the goal is registered.
         let mut goals = self.goals();
         let is_first = goals.is_empty();
-        goals.insert(goal, followed);
-        is_first
+        let (request, goal) = self.client.send_goal(goal)?;
+        goals.unanswered.push(Unanswered { request, goal, since: Instant::now(), answer });
+        Ok((goal, is_first))
     }
 
-    /// Forwards the messages about all goals until no goal is running. If the server is lost, all goals end with
+    /// Forwards the messages about all goals until all goals have ended. A goal whose result can no longer arrive ends with
     /// [`Accepted::Lost`].
     async fn run(&self, graph: &Graph, full: &str) {
         let topics = goal_topics(full);
-        let mut absent = 0;
+        let mut next_lookup = Instant::now();
         loop {
+            self.take_answers(full, || graph.servers(&topics));
             self.poll();
-            absent = if graph.server(&topics).is_some() { 0 } else { absent + 1 };
-            if absent > MAX_FAILED_LOOKUPS {
-                for followed in std::mem::take(&mut *self.goals()).into_values() {
-                    let because = format!("the server of {full} is gone");
-                    let _ = followed.events.try_send(Accepted::Lost(because));
-                }
+            if Instant::now() >= next_lookup {
+                next_lookup = Instant::now() + LOOKUP_INTERVAL;
+                self.end_lost(&graph.servers(&topics), full);
             }
             if self.goals().is_empty() {
                 return;
@@ -218,35 +279,139 @@ impl<A: Action + 'static> Connection<A> {
         }
     }
 
+    /// Receives the answers to goals. A goal that is accepted after its sender has given up is cancelled.
+    fn take_answers(&self, full: &str, servers: impl Fn() -> BTreeSet<[u8; 16]>) {
+        let mut goals = self.goals();
+        if goals.unanswered.is_empty() {
+            return;
+        }
+        while let Ok(Some((request, response))) = self.client.goal_client().receive_response() {
+            let position = goals.unanswered.iter().position(|unanswered| unanswered.request == request);
+            let Some(position) = position else { continue };
+            let Unanswered { goal, answer, .. } = goals.unanswered.swap_remove(position);
+            if !response.accepted {
+                let _ = answer.try_send(Err(GoalError::Rejected(full.to_owned())));
+                continue;
+            }
+            let (events, received) = channel::unbounded();
+            let (cancel, cancelled) = channel::bounded(1);
+            let requested = self.client.request_result(goal);
+            let result = requested.as_ref().ok().copied();
+            let pursued = requested
+                .map(|_| Pursued { goal, events: received, cancel })
+                .map_err(|error| unreachable(full, error.to_string()));
+            let is_awaited = answer.try_send(pursued).is_ok();
+            let Some(result) = result.filter(|_| is_awaited) else {
+                let _ = self.client.cancel_goal(goal);
+                continue;
+            };
+            let prospect = Prospect { servers: servers(), changed: None, ended: None };
+            let followed = Followed { result, events, cancelled, cancel: None, prospect };
+            goals.accepted.insert(goal, followed);
+        }
+    }
+
+    /// Ends the goals whose results can no longer arrive, with the servers that are present.
+    fn end_lost(&self, servers: &BTreeSet<[u8; 16]>, full: &str) {
+        let (mut goals, now) = (self.goals(), Instant::now());
+        let ClientGoals { unanswered, accepted, malformed } = &mut *goals;
+        unanswered.retain(|unanswered| unanswered.since.elapsed() < LATE_ANSWER_WAIT);
+        accepted.retain(|goal, followed| {
+            let because = match followed.prospect.loss(servers, now) {
+                None => return true,
+                Some(Loss::Server) => format!("the server of {full} is gone"),
+                Some(Loss::Result) => match malformed {
+                    Some(error) => format!(
+                        "a result of {full} is malformed, perhaps of another version of its type: {error}"
+                    ),
+                    None => format!("{full} has ended the goal, but its result has not arrived"),
+                },
+            };
+            let _ = followed.events.try_send(Accepted::Lost(because));
+            // A server that still has the goal must not go on with it.
+            let _ = self.client.cancel_goal(*goal);
+            false
+        });
+    }
+
     fn poll(&self) {
-        // Invalid messages are skipped. A goal with an invalid result ends only if the server is lost.
+        let mut goals = self.goals();
+        // Without a running goal, feedback stays in the queue, because it may arrive before the answer to its goal.
+        if goals.accepted.is_empty() {
+            return;
+        }
+        // Invalid feedback is skipped.
         while let Ok(Some((message, _))) = self.client.feedback_subscription().take() {
-            if let Some(followed) = self.goals().get(&message.goal_id) {
+            if let Some(followed) = goals.accepted.get(&message.goal_id) {
                 let _ = followed.events.try_send(Accepted::Feedback(message.feedback));
             }
         }
-        while let Ok(Some((request, response))) = self.client.result_client().receive_response() {
-            let mut goals = self.goals();
-            let goal = goals.iter().find(|(_, followed)| followed.result == request).map(|(goal, _)| *goal);
-            let end = match response.status {
-                GoalStatusEnum::Succeeded => GoalEnd::Succeeded,
-                GoalStatusEnum::Canceled => GoalEnd::Canceled,
-                _ => GoalEnd::Aborted,
-            };
-            if let Some(followed) = goal.and_then(|goal| goals.remove(&goal)) {
-                let _ = followed.events.try_send(Accepted::Ended(end, response.result));
+        loop {
+            match self.client.result_client().receive_response() {
+                Ok(Some((request, response))) => goals.end(request, response),
+                Ok(None) => break,
+                Err(error) => {
+                    // The goal is not known. Its status shows that it has ended.
+                    goals.malformed = Some(error.to_string());
+                    break;
+                }
             }
         }
-        let wishes: Vec<GoalId> = self
-            .goals()
-            .iter()
-            .filter(|(_, pursued)| pursued.cancelled.try_recv().is_ok())
-            .map(|(goal, _)| *goal)
-            .collect();
-        for goal in wishes {
-            let _ = self.client.cancel_goal(goal);
+        // Received after the results: a goal with a result is no longer registered.
+        while let Ok(Some(statuses)) = self.client.receive_status() {
+            for status in statuses.status_list {
+                goals.note_status(status.goal_info.goal_id, status.status);
+            }
+        }
+        while let Ok(Some((request, response))) = self.client.cancel_client().receive_response() {
+            goals.note_cancellation(request, response.return_code);
+        }
+        for (goal, followed) in &mut goals.accepted {
+            if followed.cancelled.try_recv().is_ok() {
+                followed.cancel = self.client.cancel_goal(*goal).ok();
+            }
         }
     }
+}
+
+impl<A: Action> ClientGoals<A> {
+    fn is_empty(&self) -> bool {
+        self.unanswered.is_empty() && self.accepted.is_empty()
+    }
+
+    fn end(&mut self, request: RmwRequestId, response: GetResultResponse<A::Result>) {
+        let goal = self.accepted.iter().find(|(_, followed)| followed.result == request);
+        let goal = goal.map(|(goal, _)| *goal);
+        let end = match response.status {
+            GoalStatusEnum::Succeeded => GoalEnd::Succeeded,
+            GoalStatusEnum::Canceled => GoalEnd::Canceled,
+            _ => GoalEnd::Aborted,
+        };
+        if let Some(followed) = goal.and_then(|goal| self.accepted.remove(&goal)) {
+            let _ = followed.events.try_send(Accepted::Ended(end, response.result));
+        }
+    }
+
+    fn note_status(&mut self, goal: GoalId, status: GoalStatusEnum) {
+        use GoalStatusEnum::{Aborted, Canceled, Succeeded};
+        if let Some(followed) = self.accepted.get_mut(&goal)
+            && matches!(status, Succeeded | Canceled | Aborted)
+        {
+            followed.prospect.ended.get_or_insert_with(Instant::now);
+        }
+    }
+
+    fn note_cancellation(&mut self, request: RmwRequestId, code: CancelGoalResponseEnum) {
+        use CancelGoalResponseEnum::{GoalTerminated, UnknownGoal};
+        let followed = self.accepted.values_mut().find(|followed| followed.cancel == Some(request));
+        if let Some(followed) = followed.filter(|_| matches!(code, UnknownGoal | GoalTerminated)) {
+            followed.prospect.ended.get_or_insert_with(Instant::now);
+        }
+    }
+}
+
+fn unreachable(action: &str, because: String) -> GoalError {
+    GoalError::Unreachable { action: action.to_owned(), because }
 }
 
 fn goal_topics(action: &str) -> Topics {
@@ -272,5 +437,44 @@ impl Node {
         let kind = ActionTypeName::new(names.package, names.name);
         expect_action(&self.graph, &full, names);
         ActionCaller { node: Arc::clone(self), full, kind, connection: smol::lock::Mutex::new(None) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::time::{Duration, Instant};
+
+    use super::{Loss, Prospect};
+
+    fn servers(names: &str) -> BTreeSet<[u8; 16]> {
+        names.bytes().map(|name| [name; 16]).collect()
+    }
+
+    /// Checks the loss of a goal that the servers with the letters `before` could have accepted. `looks` are the times
+    /// of look-ups in milliseconds, and the present servers. The goal ends at the time `ended`.
+    fn check(before: &str, ended: Option<u64>, looks: &[(u64, &str)], expected: Option<(u64, Loss)>) {
+        let start = Instant::now();
+        let at = |millis: u64| start + Duration::from_millis(millis);
+        let mut prospect = Prospect { servers: servers(before), changed: None, ended: None };
+        let mut losses = looks.iter().filter_map(|(millis, present)| {
+            prospect.ended = ended.filter(|ended| ended <= millis).map(at);
+            Some((*millis, prospect.loss(&servers(present), at(*millis))?))
+        });
+        assert_eq!(losses.next(), expected, "{before} {looks:?}");
+    }
+
+    #[test]
+    fn a_goal_is_lost_with_its_server_or_without_its_result() {
+        check("a", None, &[(0, "a"), (9_000_000, "a")], None);
+        check("a", None, &[(0, "a"), (100, ""), (599, ""), (600, "")], Some((600, Loss::Server)));
+        // An interruption of discovery is no loss.
+        check("a", None, &[(100, ""), (500, "a"), (600, ""), (1000, "a"), (1200, "a")], None);
+        // A new server appears while the endpoints of a crashed one remain, or takes its place.
+        check("a", None, &[(0, "a"), (100, "ab"), (700, "ab")], Some((700, Loss::Server)));
+        check("a", None, &[(0, "a"), (100, "b"), (700, "b")], Some((700, Loss::Server)));
+        // The goal was accepted while the endpoints of a crashed server remained.
+        check("ab", None, &[(0, "ab"), (20_000, "b"), (40_000, "b")], None);
+        check("a", Some(100), &[(3000, "a"), (3100, "a")], Some((3100, Loss::Result)));
     }
 }
