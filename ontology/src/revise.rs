@@ -127,6 +127,7 @@ impl Stated {
         deleted.extend(facts(&removed, symbols));
         let mut program = None;
         if is_plain {
+            let change = [&change[..], &retractions.axioms].concat();
             stated.keep_supported(&change, &mut deleted, symbols);
         } else {
             let [before, after] = [self, &stated].map(|stated| stated.lower(symbols));
@@ -234,8 +235,16 @@ impl Stated {
             }
             // A fact can be asserted without an axiom (by an update of the engine). It is then withdrawn
             // without a warning.
-            let is_stated =
+            let mut is_stated =
                 !retracted_facts.is_empty() && retracted_facts.iter().all(|fact| engine.is_asserted(fact));
+            if removed.len() == before && is_stated {
+                // Otherwise, another axiom states it, which remains.
+                let symbols = engine.symbols_mut();
+                let related =
+                    self.ontology.axioms.iter().filter(|other| resembles(&retraction[0].axiom, &other.axiom));
+                let mut supports = related.flat_map(|other| facts(std::slice::from_ref(other), symbols));
+                is_stated = !supports.any(|fact| retracted_facts.contains(&fact));
+            }
             if removed.len() == before && !is_stated {
                 warnings.push(Warning::NotStated { statement: retraction[0].axiom.to_string() });
             }
@@ -286,7 +295,7 @@ impl Stated {
     }
 
     /// Removes from `deleted` the facts that a remaining axiom also states. `change` contains the
-    /// changed axioms.
+    /// changed axioms and the retracted axioms that were not stated.
     fn keep_supported(
         &self,
         change: &[AnnotatedAxiom],

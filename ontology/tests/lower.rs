@@ -4,7 +4,8 @@
 use std::collections::BTreeSet;
 
 use ontology::{
-    AXIOM_SOURCE, Equality, ReadOptions, Warning, lower, lower_together, lower_with, ntriples, read_text,
+    AXIOM_SOURCE, Equality, ReadOptions, Warning, lower, lower_together, lower_with, ntriples, read_files,
+    read_text,
 };
 use rules::{Engine, Fact, Literal, Prefixes, Symbols, parse_rules};
 
@@ -599,4 +600,35 @@ fn axioms_with_more_variables_than_a_rule_can_have_are_reported() {
                 .any(|atom| matches!(atom, rules::Atom::Relation { predicate, .. } if *predicate == r))
     };
     assert!(!lowered.program.rules.iter().any(concludes));
+}
+
+/// Two documents with one ontology IRI each contain a rule, and the rules have the same position and no label.
+#[test]
+fn an_unusable_rule_does_not_remove_rules_of_other_documents() {
+    let rule = |head: &str| {
+        format!(
+            "@prefix swrl: <http://www.w3.org/2003/11/swrl#> .\n{PREFIXES}<http://e/> a owl:Ontology . :x a swrl:Variable .
+            :y a swrl:Variable . [ a swrl:Imp ; swrl:head ( {head} ) ; swrl:body ( [ a swrl:ClassAtom ;
+            swrl:classPredicate [ a owl:Class ; owl:unionOf ( :A :C ) ] ; swrl:argument1 :x ] ) ] . :i a :A ."
+        )
+    };
+    let usable = rule("[ a swrl:ClassAtom ; swrl:classPredicate :B ; swrl:argument1 :x ]");
+    let unusable = rule(
+        "[ a swrl:IndividualPropertyAtom ; swrl:propertyPredicate :p ; swrl:argument1 :x ; swrl:argument2 :y ]",
+    );
+    let directory = tempfile::tempdir().expect("a folder");
+    let files = ["a.ttl", "b.ttl"].map(|name| directory.path().join(name));
+    for texts in [[&usable, &unusable], [&unusable, &usable]] {
+        for (file, text) in files.iter().zip(texts) {
+            std::fs::write(file, text).expect("written");
+        }
+        let ontology = read_files(&files, &ReadOptions::default()).expect("readable");
+        let mut symbols = Symbols::new();
+        let lowered = lower(&ontology, &mut symbols);
+        let warnings: Vec<String> = lowered.warnings.iter().map(ToString::to_string).collect();
+        let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+        assert!(warning.contains("R202 rule <http://e/>#0") || warning.contains("?y"), "{warning}");
+        let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
+        assert_eq!(derived(&engine), BTreeSet::from(["i a B".to_owned()]));
+    }
 }

@@ -17,6 +17,7 @@ mod real_tomasys;
 mod revise;
 mod robust;
 mod runtime;
+mod syntaxes;
 mod trace;
 mod w3c;
 mod write;

@@ -183,6 +183,23 @@ fn axioms_in_unusual_forms_are_read() {
         (":r owl:propertyChainAxiom ( :p :q ) . :r a owl:ObjectProperty .", &[
             "SubObjectPropertyOf(ObjectPropertyChain(<p> <q>) <r>)",
         ]),
+        // A list that is shared with an n-ary axiom, as a whole and in part.
+        (
+            "_:l rdf:first :C ; rdf:rest ( :D ) . [] a owl:AllDisjointClasses ; owl:members _:l .
+             :E a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:unionOf _:l ] .",
+            &["EquivalentClasses(<E> ObjectUnionOf(<C> <D>))", "DisjointClasses(<C> <D>)"],
+        ),
+        (
+            "_:l rdf:first :C ; rdf:rest _:m . _:m rdf:first :D ; rdf:rest ( :E ) .
+             [] a owl:AllDisjointClasses ; owl:members _:l . :E a owl:Class .
+             :F a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:unionOf _:m ] .",
+            &[
+                "EquivalentClasses(<F> ObjectUnionOf(<D> <E>))",
+                "DisjointClasses(<C> <D>)",
+                "DisjointClasses(<C> <E>)",
+                "DisjointClasses(<D> <E>)",
+            ],
+        ),
     ] {
         let ontology = turtle(text);
         assert_eq!(shown(&ontology), expected, "{text}\n{:?}", warnings(&ontology));
@@ -496,6 +513,74 @@ fn our_tomasys_is_found_without_any_file() {
     let text = importing("http://e/root", &["http://metacontrol.org/tomasys"]);
     let ontology = read_text(&text, "root", &ReadOptions::default()).expect("embedded");
     assert_eq!(ontology.sources[1].name, "http://metacontrol.org/tomasys");
+}
+
+/// A file or text does not import itself only because the imported URL ends with its name.
+#[test]
+fn documents_do_not_import_themselves_by_name() {
+    let text = importing("http://me/robot", &["http://vendor.example/robot.owl"]);
+    let files = directory(&[("kb/robot.owl", &text)]);
+    for directories in [Vec::new(), vec![files.path().to_owned()]] {
+        let options = ReadOptions { directories, ..ReadOptions::default() };
+        let file = read_files(&[files.path().join("kb/robot.owl")], &options);
+        for result in [file, read_text(&text, "robot.owl", &ReadOptions::default())] {
+            let errors = result.expect_err("unresolved");
+            assert!(matches!(&errors[..], [Error::UnresolvedImport { .. }]), "{errors:?}");
+        }
+    }
+    let url = "https://raw.githubusercontent.com/meta-control/mc_mdl_tomasys/ros2/owl/tomasys.owl";
+    let files = directory(&[("tomasys.owl", &importing("http://me/tomasys", &[url]))]);
+    let ontology =
+        read_files(&[files.path().join("tomasys.owl")], &ReadOptions::default()).expect("embedded");
+    assert_eq!(ontology.sources[1].name, "http://metacontrol.org/tomasys");
+    // Another document with this name is the import.
+    let files = directory(&[("kb/robot.owl", &text), ("robot.owl", &importing("http://other/", &[]))]);
+    let paths = ["kb/robot.owl", "robot.owl"].map(|name| files.path().join(name));
+    assert_eq!(read_files(&paths, &ReadOptions::default()).expect("named alike").sources.len(), 2);
+}
+
+/// Two directories contain a document with equal bytes, but its relative IRIs denote other things.
+#[test]
+fn equal_texts_with_relative_iris_are_several_documents() {
+    let main = "@prefix owl: <http://www.w3.org/2002/07/owl#> . <> a owl:Ontology ; owl:imports <parts.ttl> .\n\
+        <http://e/Robot> a owl:Class . <#base> a <http://e/Robot> . [] a <http://e/Robot> .";
+    let part = |name: &str| format!("<http://e/#{name}> a <http://e/Robot> .");
+    let files = directory(&[
+        ("r1/main.ttl", main),
+        ("r2/main.ttl", main),
+        ("r1/parts.ttl", &part("x")),
+        ("r2/parts.ttl", &part("y")),
+    ]);
+    let paths = ["r1/main.ttl", "r2/main.ttl"].map(|name| files.path().join(name));
+    let ontology = read_files(&paths, &ReadOptions::default()).expect("readable");
+    let axioms = shown(&ontology).join("\n");
+    for individual in ["/r1/main.ttl#base>", "/r2/main.ttl#base>", "<x>", "<y>"] {
+        assert!(axioms.contains(individual), "{individual}: {axioms}");
+    }
+    assert_eq!(ontology.sources.len(), 4);
+    // Without relative IRIs, the documents are copies, also of their blank nodes.
+    let copy = "<http://e/Robot> a <http://www.w3.org/2002/07/owl#Class> . [] a <http://e/Robot> .";
+    let files = directory(&[("r1/main.ttl", copy), ("r2/main.ttl", copy)]);
+    let paths = ["r1/main.ttl", "r2/main.ttl"].map(|name| files.path().join(name));
+    assert_eq!(read_files(&paths, &ReadOptions::default()).expect("readable").sources.len(), 1);
+}
+
+/// The header of a document is annotated, whether the document is the first one or imported.
+#[test]
+fn headers_of_all_documents_are_annotated() {
+    let header = |iri: &str| {
+        format!(
+            "@prefix owl: <http://www.w3.org/2002/07/owl#> .\n<{iri}> a owl:Ontology ; <http://d/license> <http://cc/> ; \
+             <http://d/title> \"title\" ."
+        )
+    };
+    let files = directory(&[("a.ttl", &header("http://e/a")), ("b.ttl", &header("http://e/b"))]);
+    let paths = ["a.ttl", "b.ttl"].map(|name| files.path().join(name));
+    let [first, second] = [[&paths[0], &paths[1]], [&paths[1], &paths[0]]]
+        .map(|files| read_files(&files, &ReadOptions::default()).expect("readable"));
+    assert_eq!(shown(&first), [""; 0]);
+    assert_eq!(first.annotations.len(), 4, "{:?}", first.annotations);
+    assert_eq!((&first.annotations, &first.entities), (&second.annotations, &second.entities));
 }
 
 /// IRIs contain some characters of paths only in percent-encoded form.

@@ -361,3 +361,30 @@ fn second_cycle(case: &serde_json::Value) -> Runtime {
     runtime.apply(Delta { insert, delete: Vec::new() }).expect("applied");
     runtime
 }
+
+/// All pairs of the names would take gigabytes.
+#[test]
+fn many_names_of_an_individual_take_little_memory() {
+    let pairs: Vec<String> = (0..10_000)
+        .map(|number| format!("<http://e/a> <{}> <http://e/b{number}> .", vocab::owl::SAME_AS))
+        .collect();
+    let text = format!("{}\n<http://e/b7> a <http://e/Robot> .", pairs.join("\n"));
+    let ontology = read_text(&text, "names.ttl", &ReadOptions::default()).expect("readable");
+    let mut symbols = Symbols::new();
+    let lowered = lower(&ontology, &mut symbols);
+    let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
+    for mode in [Mode::Retract, Mode::Latch] {
+        let mut runtime = Runtime::new(engine.clone(), mode);
+        let [same_as, first, new] = [vocab::owl::SAME_AS, "http://e/a", "http://e/new"]
+            .map(|name| runtime.engine_mut().symbols_mut().name(name));
+        let pair = Fact::new(same_as, [first, new]);
+        let delta = Delta { insert: vec![pair.clone()], delete: Vec::new() };
+        let change = runtime.apply(delta).expect("it ends");
+        // All pairs with the new name in both directions, and its class.
+        assert_eq!(change.insert.len(), 2 * 10_001 + 1);
+        assert_eq!(runtime.engine().stated_facts().len(), 10_002);
+        assert_eq!(runtime.engine().matching(same_as, &[Some(new), None]).count(), 10_001);
+        let change = runtime.apply(Delta { insert: Vec::new(), delete: vec![pair] }).expect("it ends");
+        assert_eq!(change.delete.len(), 2 * 10_001 + 1);
+    }
+}

@@ -196,8 +196,7 @@ impl Engine {
 
     fn rebuild(&mut self, program: Program) -> Result<Delta, Errors> {
         // Sorted, so that the order does not depend on the history.
-        let mut stated = self.stated();
-        stated.sort_unstable();
+        let stated = self.stated_facts();
         let engine = Self::with_limits(self.symbols().clone(), program, stated, self.limits.clone())?;
         let insert = engine.facts().filter(|fact| !self.holds(fact)).collect();
         let delete = self.facts().filter(|fact| !engine.holds(fact)).collect();

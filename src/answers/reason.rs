@@ -169,7 +169,8 @@ pub fn statuses(knowledge: &Knowledge) -> Vec<(String, String)> {
     let symbols = knowledge.engine().symbols();
     let mut assertions: Vec<_> = knowledge
         .engine()
-        .facts()
+        .facts_in_brief(1)
+        .into_iter()
         .filter(|fact| match symbols.value(fact.predicate) {
             Value::Name(iri) => fact.arguments.len() == 2 && local_name(iri) == "o_status",
             Value::Literal(_) => false,

@@ -193,7 +193,7 @@ fn read(knowledge: &mut Knowledge, assertion: &str) -> Result<Fact, Message> {
 
 fn names(engine: &Engine) -> BTreeSet<String> {
     let mut symbols: BTreeSet<Symbol> = BTreeSet::new();
-    for fact in engine.facts() {
+    for fact in engine.facts_in_brief(1) {
         symbols.insert(fact.predicate);
         symbols.extend(fact.arguments);
     }

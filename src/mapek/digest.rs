@@ -32,9 +32,8 @@ pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
 
 pub(crate) fn knowledge_parts(knowledge: &Knowledge) -> [String; 2] {
     let engine = knowledge.engine();
-    let facts: Vec<rules::Fact> = engine.facts().collect();
     [
-        ontology::ntriples(engine.symbols(), &facts),
+        ontology::ntriples(engine.symbols(), &knowledge.facts_in_brief()),
         rules::print_rules(engine.program(), engine.symbols(), &rules::Prefixes::default()),
     ]
 }

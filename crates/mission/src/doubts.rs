@@ -222,7 +222,7 @@ type Stated = BTreeMap<Symbol, Vec<Fact>>;
 
 fn stated(engine: &Engine) -> Stated {
     let mut stated = Stated::new();
-    for fact in engine.facts().filter(|fact| engine.is_asserted(fact)) {
+    for fact in engine.stated_facts() {
         fact.arguments.iter().for_each(|argument| stated.entry(*argument).or_default().push(fact.clone()));
     }
     stated

@@ -122,7 +122,8 @@ pub(super) fn monotone(engine: &Engine) -> Result<Engine, Error> {
             let variables: BTreeSet<Term> = terms.collect();
             rule.body.extend(variables.into_iter().map(|variable| Atom::relation(predicate, [variable])));
         }
-        let symbols: BTreeSet<Symbol> = engine.facts().flat_map(|fact| fact.arguments).collect();
+        let facts = engine.facts_in_brief(1).into_iter();
+        let symbols: BTreeSet<Symbol> = facts.flat_map(|fact| fact.arguments).collect();
         let insert = symbols.into_iter().map(|symbol| Fact::new(predicate, [symbol])).collect();
         copy.apply(Delta { insert, delete: Vec::new() })?;
     }

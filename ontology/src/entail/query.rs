@@ -105,7 +105,7 @@ impl Prover {
                 rows(property, vec![None, Some(object)], 0)
             }
             _ => {
-                let facts = engine.facts().flat_map(|fact| fact.arguments.to_vec());
+                let facts = engine.facts_in_brief(1).into_iter().flat_map(|fact| fact.arguments);
                 let names =
                     facts.filter_map(|symbol| engine.symbols().value(symbol).as_name().map(Iri::from));
                 names.collect::<std::collections::BTreeSet<_>>().into_iter().collect()

@@ -43,6 +43,8 @@ pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunct
 pub(crate) struct Context<'a> {
     pub symbols: &'a mut Symbols,
     pub rules: Vec<Rule>,
+    /// For each SWRL rule: index in `rules` of the first rule that was lowered from it.
+    pub swrl_starts: Vec<usize>,
     pub facts: Vec<Fact>,
     pub warnings: Vec<Warning>,
     pub equality: Equality,
@@ -116,6 +118,7 @@ impl<'a> Context<'a> {
         Self {
             symbols,
             rules: Vec::new(),
+            swrl_starts: Vec::new(),
             facts: Vec::new(),
             warnings: Vec::new(),
             equality,

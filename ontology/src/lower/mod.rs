@@ -23,6 +23,8 @@ mod range;
 mod swrl;
 mod vocabulary;
 
+use std::collections::HashSet;
+
 use rules::{Atom, Error, Fact, Program, Rule, RuleIdentity, Symbols, Term};
 use tracing::field::Empty;
 use tracing::info_span;
@@ -168,8 +170,8 @@ impl Context<'_> {
         Ok(bodies)
     }
 
-    /// Removes the rules that the engine rejects, and other rules with the same identity, with a warning. One such rule
-    /// would make the engine reject the whole program. Omits the test for a rule lowered from an axiom if its body has
+    /// Removes the rules that the engine rejects, and other rules of the same SWRL rule or axiom, with a warning. One
+    /// such rule would make the engine reject the whole program. Omits the test for a rule lowered from an axiom if its body has
     /// a relation atom, or an equality with a constant: lowering then binds all variables.
     fn drop_unusable(&mut self) {
         let binds = |atom: &Atom| match atom {
@@ -178,27 +180,48 @@ impl Context<'_> {
             _ => false,
         };
         // Checking only the remaining rules saves the time for thousands of axioms.
-        let is_bound = |rule: &&Rule| *rule.identity.source == *AXIOM_SOURCE && rule.body.iter().any(binds);
-        let rules = self.rules.iter().filter(|rule| !is_bound(rule)).cloned().collect();
-        let program = Program { rules, ..Program::default() };
+        let is_bound = |rule: &Rule| *rule.identity.source == *AXIOM_SOURCE && rule.body.iter().any(binds);
+        let unbound = self.rules.iter().enumerate().filter(|(_, rule)| !is_bound(rule));
+        // Rules of several documents can have the same identity. The index identifies a rule.
+        let numbered = |(index, rule): (usize, &Rule)| {
+            let identity = RuleIdentity { position: index as u32, ..rule.identity.clone() };
+            Rule { identity, ..rule.clone() }
+        };
+        let program = Program { rules: unbound.map(numbered).collect(), ..Program::default() };
         let Err(errors) = rules::Engine::check(&program, self.symbols) else { return };
-        for error in errors {
-            let Some(identity) = rejected_rule(&error) else { continue };
+        let mut rejected = HashSet::new();
+        for mut error in errors {
+            let Some(identity) = rejected_rule(&mut error) else { continue };
+            let index = identity.position as usize;
+            *identity = self.rules[index].identity.clone();
             let identity = identity.clone();
-            self.rules.retain(|rule: &Rule| rule.identity != identity);
             self.warnings.push(Warning::UnusableRule {
                 ontology: identity.source.to_string(),
                 position: identity.position,
                 label: identity.label.as_ref().map(ToString::to_string),
                 reason: error.to_string(),
             });
+            rejected.insert((self.swrl_rule(index), identity));
         }
+        let kept: Vec<bool> = self
+            .rules
+            .iter()
+            .enumerate()
+            .map(|(index, rule)| !rejected.contains(&(self.swrl_rule(index), rule.identity.clone())))
+            .collect();
+        let mut kept = kept.into_iter();
+        self.rules.retain(|_| kept.next().unwrap_or(true));
+    }
+
+    /// Returns the number of SWRL rules up to the one from which the rule `index` was lowered.
+    fn swrl_rule(&self, index: usize) -> usize {
+        self.swrl_starts.partition_point(|&start| start <= index)
     }
 }
 
 const RANGE_IN_AGGREGATE: &str = "a data range of several alternatives in an aggregate";
 
-fn rejected_rule(error: &Error) -> Option<&RuleIdentity> {
+fn rejected_rule(error: &mut Error) -> Option<&mut RuleIdentity> {
     match error {
         Error::UnsafeHead { rule, .. }
         | Error::UnsafeBody { rule, .. }

@@ -24,6 +24,7 @@ pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
             position: rule.position,
         };
         let position = context.rules.len();
+        context.swrl_starts.push(position);
         let (ontology, label) = (rule.ontology.to_string(), rule.label.as_ref().map(ToString::to_string));
         let result = lower_rule(rule, &identity, context);
         if let Err(reason) = context.take_gaps().map_err(str::to_owned).and(result) {

@@ -34,9 +34,15 @@ struct Use {
 }
 
 /// Declares the undeclared classes and properties of `graph`, with a warning for each. `classes` contains undeclared
-/// classes that occur in triples outside of `graph`.
-pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings: &mut Vec<Warning>) {
-    let (declared, mut properties) = (Declared::of(graph), BTreeMap::new());
+/// classes that occur in triples outside of `graph`, and `ontologies` the IRIs of ontologies whose headers are not in
+/// `graph`.
+pub(crate) fn declare(
+    graph: &mut Graph,
+    mut classes: BTreeSet<String>,
+    ontologies: HashSet<Iri>,
+    warnings: &mut Vec<Warning>,
+) {
+    let (declared, mut properties) = (Declared { ontologies, ..Declared::of(graph) }, BTreeMap::new());
     for (_, triple) in graph.iter() {
         record_classes(triple, &declared, &mut classes);
         record_property(graph, triple, &declared, &mut properties);
@@ -170,6 +176,8 @@ fn state(graph: &mut Graph, iri: &str, class: &str) {
 }
 
 struct Declared {
+    /// IRIs of ontologies whose headers are not in the graph.
+    ontologies: HashSet<Iri>,
     classes: HashSet<String>,
     datatypes: HashSet<String>,
     properties: HashSet<String>,
@@ -188,6 +196,7 @@ impl Declared {
         let mut properties = instances_of(&[owl::DATATYPE_PROPERTY]);
         properties.extend(object_properties.iter().chain(&annotation_properties).cloned());
         Self {
+            ontologies: HashSet::default(),
             classes: instances_of(&[owl::CLASS, rdfs::CLASS]),
             datatypes: instances_of(&[rdfs::DATATYPE]),
             properties,
@@ -211,6 +220,9 @@ impl Declared {
             return true;
         }
         named(node).is_none_or(|iri| {
+            if self.ontologies.contains(iri) {
+                return true;
+            }
             let individual = iri.starts_with(ANONYMOUS)
                 || graph.objects(node, rdf::TYPE).any(|class| match class {
                     Term::NamedNode(class) => {

@@ -2,7 +2,9 @@
 //! disjoint classes or different individuals become axioms without horned-owl. A list that several axioms
 //! share is copied, and malformed property chains are removed.
 
-use oxrdf::{NamedNode, NamedOrBlankNode, Term};
+use std::collections::HashSet;
+
+use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term};
 
 use crate::error::Warning;
 use crate::graph::{Graph, iri_of, subject_of};
@@ -12,16 +14,17 @@ use crate::vocab::{owl, rdf};
 /// Rewrites the axioms with lists in the graph. Returns the axioms with many members, which horned-owl does not have
 /// to read.
 pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<AnnotatedAxiom> {
+    // The other steps remove lists, also those of other axioms if lists are shared.
+    unshare(graph);
     let groups = groups(graph);
     pairs(graph, owl::ALL_DISJOINT_CLASSES, owl::DISJOINT_WITH, warnings);
     pairs(graph, owl::ALL_DISJOINT_PROPERTIES, owl::PROPERTY_DISJOINT_WITH, warnings);
     check_chains(graph, warnings);
-    unshare(graph);
     groups
 }
 
 /// Number of named members above which [`groups`] removes a set from the graph.
-const MAX_PAIRED_MEMBERS: usize = 16;
+pub(crate) const MAX_PAIRED_MEMBERS: usize = 16;
 
 /// Removes and returns axioms about more than [`MAX_PAIRED_MEMBERS`] disjoint named classes or different
 /// named individuals. Pairs would be too many, and the time of horned-owl grows with the square of the length
@@ -127,16 +130,22 @@ fn chain_fault(graph: &Graph, item: &Term) -> Option<String> {
     }
 }
 
-/// Replaces a list by a copy in every triple that refers to it, except the first, because horned-owl consumes lists.
-/// Removes the types `rdf:List` of list nodes.
+/// Replaces a list by a copy in every triple that refers to it, except the first, because horned-owl consumes lists. A
+/// list that is the rest of another list is copied for every triple. Removes the types `rdf:List` of list nodes.
 fn unshare(graph: &mut Graph) {
     let references = graph.references();
-    let mut visited = std::collections::HashSet::new();
-    let shared: Vec<(usize, Term)> = graph
-        .iter()
-        .filter(|(_, triple)| triple.predicate.as_str() != rdf::REST)
+    let is_shared = |node: &BlankNode| references.get(node).is_some_and(|&count| count > 1);
+    let (tails, heads): (Vec<_>, Vec<_>) =
+        graph.iter().partition(|(_, triple)| triple.predicate.as_str() == rdf::REST);
+    let tails = tails.into_iter().filter_map(|(_, triple)| match &triple.object {
+        Term::BlankNode(node) if is_shared(node) => Some(node.clone()),
+        _ => None,
+    });
+    let mut visited: HashSet<BlankNode> = tails.collect();
+    let shared: Vec<(usize, Term)> = heads
+        .into_iter()
         .filter_map(|(index, triple)| match &triple.object {
-            Term::BlankNode(node) if references.get(node).is_some_and(|&count| count > 1) => {
+            Term::BlankNode(node) if is_shared(node) => {
                 let is_list =
                     graph.objects(&NamedOrBlankNode::from(node.clone()), rdf::FIRST).next().is_some();
                 (is_list && !visited.insert(node.clone())).then(|| (index, triple.object.clone()))

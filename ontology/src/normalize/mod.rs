@@ -28,7 +28,10 @@ mod lists;
 mod plain;
 mod swrl;
 
+use rustc_hash::FxHashSet;
+
 use depth::MAX_NESTING;
+pub(crate) use lists::MAX_PAIRED_MEMBERS;
 pub(crate) use swrl::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
 
 use crate::contents::Parts;
@@ -57,11 +60,14 @@ pub(crate) struct Merged {
     /// For each document: the index of its first triple in the graph, and its ontology IRI, or its name if it
     /// declares none.
     pub parts: Vec<(usize, Iri)>,
+    /// IRIs of the ontologies whose headers were dropped.
+    pub dropped_headers: FxHashSet<Iri>,
 }
 
 /// Drops imports, and the headers of all documents but the first.
 pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&Compact) -> bool) -> Merged {
     let (mut graph, mut bulk, mut parts) = (Graph::default(), Vec::new(), Vec::new());
+    let mut dropped_headers = FxHashSet::default();
     let [rdf_type, ontology, imports, version] =
         [rdf::TYPE, owl::ONTOLOGY, owl::IMPORTS, owl::VERSION_IRI].map(|iri| names.find(iri));
     for (index, document) in documents.into_iter().enumerate() {
@@ -72,6 +78,9 @@ pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&C
             let is_ontology = matches!(triple.object, Object::Node(class) if Some(class) == ontology);
             let header = predicate == version || (predicate == rdf_type && is_ontology);
             if predicate == imports || (header && index > 0) {
+                if is_ontology {
+                    dropped_headers.insert(names.text(triple.subject).clone());
+                }
                 continue;
             }
             if is_bulk(&triple) {
@@ -82,7 +91,7 @@ pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&C
         }
         parts.push((start, name));
     }
-    Merged { graph, bulk, parts }
+    Merged { graph, bulk, parts, dropped_headers }
 }
 
 /// Merges and rewrites documents. Entities of `known_entities` need no declaration.
@@ -96,7 +105,8 @@ pub(crate) fn normalize(
 ) -> Result<Normal, Error> {
     let files: Vec<String> = documents.iter().map(|document| document.name.clone()).collect();
     let usage = bulk::Usage::of(&documents, &names);
-    let Merged { mut graph, bulk, parts } = merge(documents, &names, |triple| usage.is_bulk(triple));
+    let Merged { mut graph, bulk, parts, dropped_headers } =
+        merge(documents, &names, |triple| usage.is_bulk(triple));
     let mut undeclared = usage.undeclared(&bulk, &names);
     for (kind, iri) in known_entities {
         if *kind == EntityKind::Class {
@@ -121,7 +131,7 @@ pub(crate) fn normalize(
     let disjoint = lists::rewrite(&mut graph, &mut warnings);
     anonymous::rewrite(&mut graph, &mut warnings);
     annotative::rewrite(&mut graph, &rules, &mut warnings);
-    kinds::declare(&mut graph, undeclared, &mut warnings);
+    kinds::declare(&mut graph, undeclared, dropped_headers, &mut warnings);
     let mut plain = plain::take(&mut graph, bulk, &mut names);
     plain.axioms.extend(disjoint);
     Ok(Normal { ntriples: graph.to_ntriples(), plain, names, rules, warnings })

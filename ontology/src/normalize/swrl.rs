@@ -6,14 +6,14 @@
 //! argument of a data atom becomes a variable with the individual's name. An empty body or head becomes one
 //! atom that always holds.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use oxrdf::{Literal, NamedNode, NamedOrBlankNode, Term};
 
 use crate::error::Warning;
 use crate::graph::{Graph, iri_of, subject_of};
 use crate::owl::{ANONYMOUS, Iri};
-use crate::vocab::{owl, rdf, swrl};
+use crate::vocab::{owl, rdf, rdfs, swrl};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Origin {
@@ -61,13 +61,16 @@ pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut 
                 origins.push(origin);
             }
             Err(reason) => {
-                let label = graph.objects(&node, crate::vocab::rdfs::LABEL).find_map(|term| match term {
+                let labels = pass.annotated(&node).flat_map(|node| graph.objects(node, rdfs::LABEL));
+                let label = labels.into_iter().find_map(|term| match term {
                     Term::Literal(literal) => Some(literal.value().to_owned()),
                     _ => None,
                 });
                 let (ontology, position) = (origin.ontology.to_string(), origin.position);
                 warnings.push(Warning::UnreadRule { ontology, position, label, reason });
-                pass.replaced.extend(graph.of(&node).map(|(index, _)| index));
+                let indices = pass.annotated(&node).flat_map(|node| graph.of(node)).map(|(index, _)| index);
+                let indices: Vec<usize> = indices.collect();
+                pass.replaced.extend(indices);
             }
         }
     }
@@ -87,6 +90,9 @@ struct Pass {
     /// Terms that occur outside of rules, except as classes.
     described: HashSet<Term>,
     data_properties: HashSet<Term>,
+    /// Maps a rule to the nodes of the type `owl:Axiom` with its annotations. horned-owl's RDF writer annotates the type
+    /// of the rule instead of the rule.
+    annotations: HashMap<NamedOrBlankNode, Vec<NamedOrBlankNode>>,
     /// Indices of the triples that are removed at the end of the pass.
     replaced: HashSet<usize>,
     rule: usize,
@@ -104,7 +110,15 @@ impl Pass {
             declared(owl::DATATYPE_PROPERTY).filter(|term| !object_properties.contains(term)).collect();
         let mut described = HashSet::new();
         let mut replaced = HashSet::new();
+        let mut annotations = HashMap::<_, Vec<_>>::new();
         for (index, triple) in graph.iter() {
+            if triple.predicate.as_str() == owl::ANNOTATED_TARGET
+                && iri_of(&triple.object) == Some(swrl::IMP)
+                && let Some(rule) =
+                    graph.object(&triple.subject, owl::ANNOTATED_SOURCE).ok().and_then(subject_of)
+            {
+                annotations.entry(rule).or_default().push(triple.subject.clone());
+            }
             if triple.predicate.as_str().starts_with(swrl::NS) {
                 continue;
             }
@@ -122,11 +136,20 @@ impl Pass {
             variables,
             described,
             data_properties,
+            annotations,
             replaced,
             rule: 0,
             canonical_variables: Vec::new(),
             unknown: Vec::new(),
         }
+    }
+
+    /// Returns the nodes whose statements annotate a rule: the rule itself and nodes of the type `owl:Axiom`.
+    fn annotated<'a>(
+        &'a self,
+        rule: &'a NamedOrBlankNode,
+    ) -> impl Iterator<Item = &'a NamedOrBlankNode> + use<'a> {
+        std::iter::once(rule).chain(self.annotations.get(rule).into_iter().flatten())
     }
 
     fn read(
@@ -283,10 +306,15 @@ impl Pass {
             graph.state(&rule, part, list);
         }
         graph.state(&rule, ORIGIN, Literal::new_simple_literal(self.rule.to_string()));
-        let annotations: Vec<_> = graph.of(original).map(|(index, triple)| (index, triple.clone())).collect();
+        let annotations = self.annotated(original).flat_map(|node| graph.of(node));
+        let annotations: Vec<_> = annotations.map(|(index, triple)| (index, triple.clone())).collect();
+        let structure = [owl::ANNOTATED_SOURCE, owl::ANNOTATED_PROPERTY, owl::ANNOTATED_TARGET];
         for (index, triple) in annotations {
             let predicate = triple.predicate.as_str();
-            if !predicate.starts_with(rdf::NS) && !predicate.starts_with(swrl::NS) {
+            if !predicate.starts_with(rdf::NS)
+                && !predicate.starts_with(swrl::NS)
+                && !structure.contains(&predicate)
+            {
                 graph.state(&rule, predicate, triple.object);
             }
             self.replaced.insert(index);

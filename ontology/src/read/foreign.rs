@@ -6,9 +6,13 @@ pub(super) fn recognized(text: &[u8]) -> Option<&'static str> {
         return Some("an empty document; an ontology has at least one statement");
     }
     let starts = |marks: &[&[u8]]| marks.iter().any(|mark| head.starts_with(mark));
+    // In Turtle, a blank node with a property list begins with the same bracket as an array of JSON.
+    let is_array = head
+        .strip_prefix(b"[")
+        .is_some_and(|tail| matches!(tail.trim_ascii_start().first(), Some(b'{' | b'[' | b'"')));
     if text.starts_with(b"\x1f\x8b") || text.starts_with(b"PK\x03\x04") || text.starts_with(b"BZh") {
         Some("a compressed file; unpack it first")
-    } else if starts(&[b"{", b"[{", b"[\n", b"[ {"]) && !starts(&[b"[ a", b"[]"]) {
+    } else if starts(&[b"{"]) || is_array {
         Some("JSON, perhaps JSON-LD, which is not read; convert it to Turtle")
     } else if starts(&[b"format-version:", b"ontology:", b"[Term]"]) {
         Some(
@@ -52,6 +56,10 @@ mod tests {
             ("<!DOCTYPE html><html/>", "web page"),
             ("[] a <http://x> .", ""),
             ("[ a <http://x> ] .", ""),
+            ("[\n  a <http://x> ] .", ""),
+            ("[ # c\n <http://x#p> 1 ] .", ""),
+            ("[\n  {\"@id\": \"http://x\"}\n]", "JSON"),
+            ("[{}]", "JSON"),
             ("@prefix : <http://x#> .", ""),
             ("Prefix(:=<http://x#>)", ""),
         ] {

@@ -9,7 +9,7 @@
 //!    Catalogs);
 //! 4. in the directory of the importing document, then in the given directories and their subdirectories: by ontology
 //!    IRI, then by the last segment of the URL; among several matching files, the one whose path has most segments of
-//!    the URL;
+//!    the URL. The importing document itself is no match by name;
 //! 5. in a directory that is named like one of the first two segments of the URL's path and lies next to the
 //!    directory of the importing document or next to a near ancestor of it, because repositories are often checked
 //!    out side by side;
@@ -75,12 +75,13 @@ impl Resolver {
         Ok(Self { catalogs, files: OnceCell::new(), directories: options.directories.clone() })
     }
 
-    /// Finds the document of an import, if there is one. `importer` is `None` if the importing document has no path.
-    /// Returns an error if the catalog next to that document cannot be used.
+    /// Finds the document of an import of `documents[index]`, if there is one. `importer` is the canonical path of that
+    /// document, if it has one. Returns an error if the catalog next to that document cannot be used.
     pub(crate) fn resolve(
         &self,
         import: &str,
         importer: Option<&Path>,
+        index: usize,
         documents: &[Document],
     ) -> Result<Option<Resolution>, Error> {
         if let Some(path) = file_of_iri(import).filter(|path| path.is_file()) {
@@ -94,10 +95,12 @@ impl Resolver {
         }
         let siblings = importer.and_then(Path::parent).map(|directory| candidates(directory, 0));
         let file = siblings
-            .and_then(|files| best_match(import, &files))
-            .or_else(|| best_match(import, self.files()));
+            .and_then(|files| best_match(import, importer, &files))
+            .or_else(|| best_match(import, importer, self.files()));
         let file = file.or_else(|| checked_out(import, importer?));
-        let named = || is_named_alike(import, documents).then_some(Resolution::Loaded);
+        let (before, after) = (&documents[..index], &documents[index + 1..]);
+        let is_named_alike = || is_named_alike(import, before) || is_named_alike(import, after);
+        let named = || is_named_alike().then_some(Resolution::Loaded);
         Ok(file.map(Resolution::File).or_else(named).or_else(|| embedded(import)))
     }
 
@@ -211,7 +214,7 @@ fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
         for segment in directories.iter().take(2) {
             let repository = ancestor.join(segment);
             if repository.is_dir()
-                && let Some(path) = best_match(import, &candidates(&repository, MAX_DEPTH))
+                && let Some(path) = best_match(import, Some(importer), &candidates(&repository, MAX_DEPTH))
             {
                 return Some(path);
             }
@@ -278,12 +281,15 @@ fn declared_iri(path: &Path) -> Option<String> {
     document::ontology_iri(&head)
 }
 
-fn best_match(import: &str, files: &[OntologyFile]) -> Option<PathBuf> {
+/// Returns the file that fits an import best: by IRI, otherwise by name. A file does not import itself by name.
+fn best_match(import: &str, importer: Option<&Path>, files: &[OntologyFile]) -> Option<PathBuf> {
     let by_iri: Vec<_> =
         files.iter().filter(|file| file.iri.as_deref().is_some_and(|iri| same_iri(iri, import))).collect();
     let name = last_segment(import);
-    let by_name =
-        || files.iter().filter(|file| file.path.file_name().is_some_and(|file_name| file_name == name));
+    let is_importer = |path: &Path| path.canonicalize().is_ok_and(|path| Some(&*path) == importer);
+    let fits =
+        |path: &Path| path.file_name().is_some_and(|file_name| file_name == name) && !is_importer(path);
+    let by_name = || files.iter().filter(|file| fits(&file.path));
     let matching: Vec<_> = if by_iri.is_empty() { by_name().collect() } else { by_iri };
     let segments: Vec<&str> = import.split('/').filter(|segment| !segment.is_empty()).collect();
     let shared = |file: &OntologyFile| {

@@ -147,7 +147,7 @@ fn closure(
         // All pending documents are read before the next imports are resolved, because an import may mean
         // one of them.
         while let Some(item) = pending.pop_front() {
-            match load(item, options.documents_before + documents.len(), &mut visited, options, names) {
+            match load(item, &documents, &mut visited, options, names) {
                 Ok(Some((document, path, text))) => {
                     texts.push((document.name.clone(), text));
                     warnings.extend(duplicate_ontology(&document, &documents));
@@ -168,7 +168,7 @@ fn closure(
             let resolution = if options.closed {
                 Ok(None)
             } else {
-                resolver.resolve(import, paths[next].as_deref(), &documents)
+                resolver.resolve(import, paths[next].as_deref(), next, &documents)
             };
             match resolution {
                 Ok(Some(Resolution::Loaded)) => {}
@@ -195,10 +195,11 @@ fn closure(
 
 type Loaded = Option<(Document, Option<PathBuf>, Text)>;
 
-/// Reads and parses one document. Returns `None` if the same file or an equal text was read before.
+/// Reads and parses one document. Returns `None` if the same file was read before, or an equal text with the same
+/// meaning: relative IRIs can have another one in another directory.
 fn load(
     item: Pending,
-    index: usize,
+    documents: &[Document],
     visited: &mut Visited,
     options: &ReadOptions,
     names: &mut Names,
@@ -231,8 +232,11 @@ fn load(
     if !options.allow_empty || !text.trim_ascii().is_empty() {
         document::require_syntax(&text, &name)?;
     }
-    let document = document::parse(&text, &name, &base, &format!("d{index}"), names)?;
-    Ok(visited.text(text, path.as_deref()).map(|text| (document, path, text)))
+    let prefix = format!("d{}", options.documents_before + documents.len());
+    let document = document::parse(&text, &name, &base, &prefix, names)?;
+    let is_repeated = |index: usize| document.has_equal_triples(&documents[index], names);
+    let text = visited.text(text, path.as_deref(), documents.len(), is_repeated);
+    Ok(text.map(|text| (document, path, text)))
 }
 
 fn duplicate_ontology(document: &Document, documents: &[Document]) -> Option<Warning> {

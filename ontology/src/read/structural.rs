@@ -3,12 +3,15 @@
 
 use std::borrow::Cow;
 
+use rustc_hash::FxHashSet;
+
 use super::entities;
 use super::message::shortened;
 use super::syntax::{self, Syntax};
 use crate::error::{Error, Errors, Position};
 use crate::horned;
 use crate::normalize::depth::MAX_NESTING;
+use crate::vocab::{owl, rdf, rdfs, swrl, swrlb, xsd};
 
 pub(super) struct Structural<'a> {
     pub name: &'a str,
@@ -62,14 +65,24 @@ impl Structural<'_> {
                 return Err(self.too_deep(offset));
             }
         }
-        let fault = |fault: horned::Fault| match undeclared_prefix(words.clone()) {
-            // horned-owl reports an undeclared prefix as a generic syntax error.
-            Some((offset, prefix)) => {
-                self.malformed(offset, &format!("the prefix `{prefix}` is not declared"))
+        let undeclared = undeclared_prefixes(words.clone());
+        let standard = |prefix: &[u8]| STANDARD_PREFIXES.iter().find(|(name, _)| name.as_bytes() == prefix);
+        let missing = undeclared.iter().filter_map(|(_, prefix)| standard(prefix));
+        let declarations: String = missing.map(|(name, iri)| format!("Prefix({name}=<{iri}>)")).collect();
+        let fault = |fault: horned::Fault| {
+            match undeclared.iter().find(|(_, prefix)| standard(prefix).is_none()) {
+                // horned-owl reports an undeclared prefix as a generic syntax error.
+                Some((offset, prefix)) => {
+                    let prefix = String::from_utf8_lossy(prefix);
+                    self.malformed(*offset, &format!("the prefix `{prefix}` is not declared"))
+                }
+                None => self.malformed(fault.offset.saturating_sub(declarations.len()), &fault.message),
             }
-            None => self.malformed(fault.offset, &fault.message),
         };
-        let text = without_double_inverses(words.clone());
+        let mut text = without_double_inverses(words);
+        if !declarations.is_empty() {
+            text = [declarations.as_bytes(), &text].concat().into();
+        }
         horned::transcribe(&text, self.syntax).map(relabelled).map_err(fault)
     }
 }
@@ -170,25 +183,36 @@ fn string_length(text: &[u8]) -> usize {
     text.len()
 }
 
-/// Returns the first prefix without a declaration, with its offset. Standard prefixes such as `owl:` and `xsd:`
-/// need no declaration.
-fn undeclared_prefix(words: Words) -> Option<(usize, String)> {
-    let mut declared: Vec<&[u8]> =
-        vec![b"owl:", b"rdf:", b"rdfs:", b"xsd:", b"xml:", b"_:", b"swrl:", b"swrlb:"];
-    let mut previous: [&[u8]; 2] = [b"", b""];
+/// Prefixes that need no declaration ([1], section 2.4), and prefixes that tools use without a declaration.
+///
+/// [1] OWL 2 Web Ontology Language, Structural Specification and Functional-Style Syntax, W3C 2012.
+const STANDARD_PREFIXES: [(&str, &str); 7] = [
+    ("rdf:", rdf::NS),
+    ("rdfs:", rdfs::NS),
+    ("xsd:", xsd::NS),
+    ("owl:", owl::NS),
+    ("xml:", "http://www.w3.org/XML/1998/namespace"),
+    ("swrl:", swrl::NS),
+    ("swrlb:", swrlb::NS),
+];
+
+/// Returns the prefixes without a declaration, each with the offset of its first use.
+fn undeclared_prefixes(words: Words<'_>) -> Vec<(usize, &[u8])> {
+    // The prefix of blank nodes is part of the grammar.
+    let mut visited = FxHashSet::<&[u8]>::from_iter([&b"_:"[..]]);
+    let (mut undeclared, mut previous) = (Vec::new(), [&b""[..]; 2]);
     for (offset, word) in words {
         if let Some(colon) = word.iter().position(|&byte| byte == b':') {
             let start = word.iter().rposition(|&byte| byte == b'^').map_or(0, |index| index + 1).min(colon);
             let prefix = &word[start..=colon];
-            if previous == [&b"Prefix"[..], b"("] {
-                declared.push(prefix);
-            } else if !declared.contains(&prefix) {
-                return Some((offset + start, String::from_utf8_lossy(prefix).into_owned()));
+            let is_declaration = previous == [&b"Prefix"[..], b"("];
+            if visited.insert(prefix) && !is_declaration {
+                undeclared.push((offset + start, prefix));
             }
         }
         previous = [previous[1], word];
     }
-    None
+    undeclared
 }
 
 /// Replaces `_:_:` at the start of labels of blank nodes by `_:own-`. The reason is that horned-owl's readers
@@ -249,16 +273,17 @@ mod tests {
     }
 
     #[test]
-    fn the_first_undeclared_prefix_is_found() {
+    fn undeclared_prefixes_are_listed_once() {
         for (text, expected) in [
-            ("Prefix(:=<http://x#>) Ontology(<http://x> Declaration(Class(:A)))", None),
-            ("Ontology(<http://x>\nDeclaration(Class(foo:A))\n)", Some((38, "foo:"))),
-            ("Prefix(a:=<u:>) Ontology(Annotation(a:b \"c:d (\") # e:f\n)", None),
-            ("Ontology(ClassAssertion(owl:Thing _:x))", None),
-            ("Prefix(a:=<u:>) Ontology(DataPropertyAssertion(a:p a:i \"1\"^^b:c))", Some((60, "b:"))),
+            ("Prefix(:=<http://x#>) Ontology(<http://x> Declaration(Class(:A)))", &[][..]),
+            ("Ontology(<http://x>\nDeclaration(Class(foo:A))\n)", &[(38, "foo:")]),
+            ("Prefix(a:=<u:>) Ontology(Annotation(a:b \"c:d (\") # e:f\n)", &[]),
+            ("Ontology(ClassAssertion(owl:Thing _:x) ClassAssertion(owl:Thing _:y))", &[(24, "owl:")]),
+            ("Prefix(a:=<u:>) Ontology(DataPropertyAssertion(a:p a:i \"1\"^^b:c))", &[(60, "b:")]),
         ] {
-            let actual = undeclared_prefix(Words { text: text.as_bytes(), cursor: 0 });
-            let expected = expected.map(|(offset, prefix)| (offset, prefix.to_owned()));
+            let actual = undeclared_prefixes(Words { text: text.as_bytes(), cursor: 0 });
+            let expected: Vec<_> =
+                expected.iter().map(|(offset, prefix)| (*offset, prefix.as_bytes())).collect();
             assert_eq!(actual, expected, "{text}");
         }
     }

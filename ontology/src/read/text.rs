@@ -34,22 +34,30 @@ pub(super) struct Visited {
     /// Canonical paths of the files.
     pub paths: HashSet<PathBuf>,
     hash: RandomState,
-    texts: HashMap<u64, Vec<Text>>,
+    /// Texts with the indices of their documents, by hash.
+    texts: HashMap<u64, Vec<(Text, usize)>>,
 }
 
 impl Visited {
-    /// Adds a text. Returns `None` if an equal text was added before.
-    pub(super) fn text(&mut self, text: Vec<u8>, file: Option<&Path>) -> Option<Text> {
+    /// Adds the text of the document `index`. Returns `None` if an equal text was added before for a document that
+    /// fulfils `is_repeated`.
+    pub(super) fn text(
+        &mut self,
+        text: Vec<u8>,
+        file: Option<&Path>,
+        index: usize,
+        is_repeated: impl Fn(usize) -> bool,
+    ) -> Option<Text> {
         let same_hash = self.texts.entry(self.hash.hash_one(&text)).or_default();
         // Equal hashes do not imply equal texts.
-        if same_hash.iter().any(|other| *other.get() == *text) {
+        if same_hash.iter().any(|(other, index)| *other.get() == *text && is_repeated(*index)) {
             return None;
         }
         let text = match file {
             Some(path) => Text::File(path.to_owned()),
             None => Text::Memory(Arc::new(text)),
         };
-        same_hash.push(text.clone());
+        same_hash.push((text.clone(), index));
         Some(text)
     }
 }

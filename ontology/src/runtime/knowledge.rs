@@ -42,12 +42,12 @@ pub struct Runtime {
 impl Runtime {
     /// Creates a runtime from an engine.
     pub fn new(engine: Engine, mode: Mode) -> Self {
-        let facts: Vec<Fact> = engine.facts().collect();
-        let relations = facts.iter().map(|fact| (fact.predicate, fact.arguments.len())).collect();
+        let relations = engine.predicates().collect();
         let pending = match mode {
             Mode::Retract => BTreeSet::new(),
-            // The initial conclusions become assertions at the end of the first cycle without violations.
-            Mode::Latch => facts.into_iter().filter(|fact| !engine.is_asserted(fact)).collect(),
+            // The initial conclusions become assertions at the end of the first cycle without violations, but not
+            // equalities.
+            Mode::Latch => engine.inferred_in_brief(1).into_iter().collect(),
         };
         Self { engine, mode, pending, reasons: BTreeMap::new(), relations }
     }

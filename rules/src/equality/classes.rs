@@ -192,12 +192,15 @@ impl Classes {
     }
 }
 
-/// Returns the arguments of all facts that a row about representatives represents. `names` returns the
-/// names in the class of a representative, or `None` if the symbol represents only itself.
-pub(super) fn expand<'n>(row: &[Symbol], names: impl Fn(Symbol) -> Option<&'n [Symbol]>) -> Vec<Arguments> {
+/// Returns the arguments of all facts that a row about representatives represents. `names` returns the names of a
+/// symbol in a column that the facts can have there, or `None` if the symbol represents only itself.
+pub(super) fn expand<'n>(
+    row: &[Symbol],
+    names: impl Fn(usize, Symbol) -> Option<&'n [Symbol]>,
+) -> Vec<Arguments> {
     let mut rows: Vec<Arguments> = vec![Arguments::with_capacity(row.len())];
-    for &symbol in row {
-        match names(symbol) {
+    for (column, &symbol) in row.iter().enumerate() {
+        match names(column, symbol) {
             None => rows.iter_mut().for_each(|row| row.push(symbol)),
             Some(names) => {
                 let append = |row: &Arguments, name: Symbol| row.iter().copied().chain([name]).collect();

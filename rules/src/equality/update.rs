@@ -30,7 +30,8 @@ struct Update<'e> {
     net_change: FxHashMap<Fact, i8>,
     /// Maps each name whose class has changed to the members of its class before the update.
     old_classes: FxHashMap<Symbol, Arc<[Symbol]>>,
-    /// Facts that held before the update and may have ceased to hold. Not collected if `silent`.
+    /// Facts that held before the update and may have ceased to hold, except `owl:sameAs` pairs of equal names, which
+    /// `old_classes` contains. Not collected if `silent`.
     previous_facts: FxHashSet<Fact>,
     /// `true` during the first evaluation, which reports no changes.
     silent: bool,
@@ -265,8 +266,10 @@ impl<'e> Update<'e> {
                 |&(row, &sign): &(&Fact, &i8)| sign == -1 && row.arguments.contains(&representative);
             rows.extend(self.net_change.iter().filter(was_removed).map(|(row, _)| row.clone()));
             for row in rows {
-                let facts = self.facts_before(&row);
-                self.previous_facts.extend(facts);
+                if !self.equality.is_reflexive(&row) {
+                    let facts = self.facts_before(&row);
+                    self.previous_facts.extend(facts);
+                }
             }
         }
         for &name in class.iter() {
@@ -476,15 +479,15 @@ impl<'e> Update<'e> {
         for (row, net_change) in net_change {
             match net_change {
                 1 => rows.push(row),
-                -1 => {
+                -1 if !self.equality.is_reflexive(&row) => {
                     let facts = self.facts_before(&row);
                     self.previous_facts.extend(facts);
                 }
                 _ => {}
             }
         }
-        for row in rows {
-            after.extend(self.equality.facts_of(&row, &|symbol| self.equality.names(symbol)));
+        for row in rows.iter().filter(|row| !self.equality.is_reflexive(row)) {
+            after.extend(self.equality.facts_of(row, &|symbol| self.equality.names(symbol)));
         }
         // A pair of a name with itself holds only if it is stated, so its change is taken from the
         // input.
@@ -494,13 +497,46 @@ impl<'e> Update<'e> {
             };
             facts.iter().filter(is_reflexive).cloned().collect()
         };
-        let mut insert: Vec<Fact> =
-            after.difference(&self.previous_facts).cloned().chain(reflexive(added)).collect();
-        let mut delete: Vec<Fact> =
-            self.previous_facts.difference(&after).cloned().chain(reflexive(removed)).collect();
+        let (joined, separated) = self.changed_pairs();
+        let new = after.difference(&self.previous_facts).cloned();
+        let mut insert: Vec<Fact> = new.chain(joined).chain(reflexive(added)).collect();
+        let old = self.previous_facts.difference(&after).cloned();
+        let mut delete: Vec<Fact> = old.chain(separated).chain(reflexive(removed)).collect();
         insert.sort_unstable();
         delete.sort_unstable();
         Delta { insert, delete }
+    }
+
+    /// Returns the `owl:sameAs` pairs of different names that hold only after the update, and those that held only
+    /// before it. The time is linear in the number of names and of returned pairs.
+    fn changed_pairs(&self) -> (Vec<Fact>, Vec<Fact>) {
+        // The names that are in one class both before and after the update, by these two classes. The first name
+        // identifies an old class, the representative a new one.
+        let mut blocks: BTreeMap<(Symbol, Symbol), Vec<Symbol>> = BTreeMap::new();
+        for (&name, class) in &self.old_classes {
+            blocks.entry((class[0], self.equality.classes.find(name))).or_default().push(name);
+        }
+        let (mut old, mut new) = (BTreeMap::<_, Vec<_>>::new(), BTreeMap::<_, Vec<_>>::new());
+        for ((before, after), names) in &blocks {
+            old.entry(before).or_default().push(names);
+            new.entry(after).or_default().push(names);
+        }
+        let pairs = |classes: BTreeMap<&Symbol, Vec<&Vec<Symbol>>>| {
+            let mut pairs = Vec::new();
+            for blocks in classes.values() {
+                for (index, block) in blocks.iter().enumerate() {
+                    let others = || blocks[index + 1..].iter().copied().flatten();
+                    for &left in *block {
+                        for &right in others() {
+                            let both = [[left, right], [right, left]];
+                            pairs.extend(both.map(|pair| Fact::new(self.equality.same_as, pair)));
+                        }
+                    }
+                }
+            }
+            pairs
+        };
+        (pairs(new), pairs(old))
     }
 }
 

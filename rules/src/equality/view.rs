@@ -61,7 +61,7 @@ impl Equality {
         names: &impl Fn(Symbol) -> Option<&'n [Symbol]>,
     ) -> Vec<Fact> {
         let (predicate, is_reflexive) = (row.predicate, self.is_reflexive(row));
-        let rows = expand(&row.arguments, names).into_iter();
+        let rows = expand(&row.arguments, |_, symbol| names(symbol)).into_iter();
         let rows = rows.filter(move |row| !is_reflexive || row[0] != row[1]);
         rows.map(|arguments| Fact { predicate, arguments }).collect()
     }
@@ -107,9 +107,15 @@ impl Equality {
                 results.extend(Some(row).filter(&fits));
                 continue;
             }
-            let row = Fact::new(predicate, row.iter().copied());
-            let facts = self.facts_of(&row, &|symbol| self.names(symbol));
-            results.extend(facts.into_iter().map(|fact| fact.arguments).filter(&fits));
+            // A name in the pattern belongs to the class of the symbol in its column.
+            let names = |column: usize, symbol| match &pattern[column] {
+                Some(name) => Some(std::slice::from_ref(name)),
+                None => self.names(symbol),
+            };
+            // The pairs of names with themselves follow.
+            let is_reflexive = predicate == self.same_as && row.len() == 2 && row[0] == row[1];
+            let rows = expand(row, names).into_iter();
+            results.extend(rows.filter(|row| !is_reflexive || row[0] != row[1]));
         }
         if predicate == self.same_as && pattern.len() == 2 {
             results.extend(self.reflexive_pairs(pattern[0]).filter(fits));

@@ -138,7 +138,7 @@ impl Knowledge {
         let engine = self.engine();
         match &self.stated {
             Some(stated) => stated.to_vec(),
-            None => engine.facts().filter(|fact| engine.is_asserted(fact)).collect(),
+            None => engine.stated_facts(),
         }
     }
 
@@ -396,8 +396,7 @@ impl Knowledge {
     pub fn statements(&self) -> Statements {
         let stated = |runtime: &Runtime| -> BTreeSet<Statement> {
             let engine = runtime.engine();
-            let facts = engine.facts().filter(|fact| engine.is_asserted(fact));
-            facts.map(|fact| Statement::of(engine, &fact)).collect()
+            engine.stated_facts().iter().map(|fact| Statement::of(engine, fact)).collect()
         };
         let (before, now) = (stated(&self.origin), stated(&self.runtime));
         Statements {
@@ -436,8 +435,8 @@ impl Knowledge {
         let differing = statements.added.iter().chain(&statements.removed).filter(|change| change.is_state());
         let places: BTreeSet<_> = differing.filter_map(place).collect();
         let engine = self.origin.engine();
-        let stated = engine.facts().filter(|fact| engine.is_asserted(fact));
-        let stated = stated.map(|fact| Statement::of(engine, &fact));
+        let stated = engine.stated_facts();
+        let stated = stated.iter().map(|fact| Statement::of(engine, fact));
         let mut merged = statements.clone();
         merged.removed.extend(stated.filter(|own| place(own).is_some_and(|place| places.contains(&place))));
         self.restore(&merged)
@@ -505,6 +504,13 @@ impl Knowledge {
     /// listed.
     pub fn inferred(&self) -> Vec<Fact> {
         self.engine().inferred_in_brief(MANY_NAMES)
+    }
+
+    /// Returns all facts that hold, in the order of symbols. Equal names are treated as in [`Knowledge::inferred`].
+    pub fn facts_in_brief(&self) -> Vec<Fact> {
+        let mut facts = self.engine().facts_in_brief(MANY_NAMES);
+        facts.sort_unstable();
+        facts
     }
 
     /// Returns all contradictions; empty if the knowledge is consistent.
