@@ -1,7 +1,8 @@
 //! Conversion of exact numbers from and to decimal text and JSON.
 
+use num_bigint::BigInt;
 use num_rational::BigRational;
-use num_traits::{ToPrimitive, Zero};
+use num_traits::{Signed as _, ToPrimitive, Zero};
 use serde_json::Value;
 
 /// Maximum number of characters of an accepted number, and maximum absolute value of its decimal
@@ -10,9 +11,14 @@ const MAX_CHARACTERS: usize = 40;
 
 pub(crate) const DECIMAL: &str = "a decimal number (at most 40 characters; exponent from -40 to 40)";
 
-/// Number of decimals to which values are rounded. Floating-point values of a robot would otherwise
-/// make the planner's integers huge.
+/// Number of decimals, or significant digits of small values, to which long values are rounded.
 const DECIMALS: u32 = 6;
+
+/// Maximum number of significant digits of a reported value that is not rounded.
+const EXACT_DIGITS: usize = 9;
+
+/// Maximum number of bits of the denominator of a value that [`bounded`] does not round.
+const MAX_DENOMINATOR_BITS: u64 = 64;
 
 /// Parses a decimal, with or without an exponent: `-12`, `0.25`, `1e-2`. Returns `None` for other
 /// text and for numbers above the limits.
@@ -33,6 +39,43 @@ pub(crate) fn exact(text: &str) -> Option<BigRational> {
 pub(crate) fn rounded(value: &BigRational) -> BigRational {
     let scale = BigRational::from_integer(10_i64.pow(DECIMALS).into());
     (value * &scale).round() / scale
+}
+
+/// Rounds a reported decimal to six decimals, or to six significant digits if they have more decimals. Values of at most
+/// nine significant digits are not rounded. Floating-point values of a robot would otherwise make the planner's integers
+/// huge.
+pub(crate) fn reported(value: &BigRational) -> BigRational {
+    let shifted = value * BigRational::from_integer(scale_of(value));
+    if shifted.to_integer().abs().to_string().len() <= EXACT_DIGITS {
+        return value.clone();
+    }
+    let whole = |power| BigRational::from_integer(BigInt::from(10).pow(power));
+    let (mut scale, least) = (whole(DECIMALS), whole(DECIMALS - 1));
+    while value.abs() * &scale < least {
+        scale *= whole(1);
+    }
+    (value * &scale).round() / scale
+}
+
+/// Returns `true` if `value` rounded to the decimals of the decimal `report`, at least six, is `report`.
+pub(crate) fn confirms(report: &BigRational, value: &BigRational) -> bool {
+    let scale = BigRational::from_integer(scale_of(report).max(BigInt::from(10).pow(DECIMALS)));
+    (value * &scale).round() == report * scale
+}
+
+/// Returns the least power of ten whose product with a decimal is an integer.
+fn scale_of(decimal: &BigRational) -> BigInt {
+    let mut scale = BigInt::from(1);
+    while !(&scale % decimal.denom()).is_zero() {
+        scale *= 10;
+    }
+    scale
+}
+
+/// Rounds a value whose denominator has become huge, because amounts of changes depend on the value. Otherwise, the
+/// denominator would grow with every change.
+pub(crate) fn bounded(value: BigRational) -> BigRational {
+    if value.denom().bits() > MAX_DENOMINATOR_BITS { rounded(&value) } else { value }
 }
 
 /// Parses a JSON number, or a string that contains a number. Returns `None` for other values, and in the cases of
@@ -69,10 +112,37 @@ pub(crate) fn of_plan(value: &planner::Exact) -> BigRational {
 
 #[cfg(test)]
 mod tests {
-    use super::{DECIMAL, MAX_CHARACTERS, decimal, exact, rounded};
+    use super::{DECIMAL, MAX_CHARACTERS, confirms, decimal, exact, reported, rounded};
 
     fn check(text: &str, expected: Option<&str>) {
         assert_eq!(exact(text).map(|value| decimal(&rounded(&value))).as_deref(), expected, "{text}");
+    }
+
+    #[test]
+    fn only_long_reports_are_rounded() {
+        for (report, expected) in [
+            ("0", "0"),
+            ("0.3333334", "0.3333334"),
+            ("-12.0000004", "-12.0000004"),
+            ("0.0000004", "0.0000004"),
+            ("0.30000000000000004", "0.3"),
+            ("0.30000001192092896", "0.3"),
+            ("-0.00012345678901234", "-0.000123457"),
+            ("123456789012.1234567", "123456789012.123457"),
+        ] {
+            let report = exact(report).expect("a number");
+            assert_eq!(decimal(&reported(&report)), expected);
+        }
+        let third = exact("1").expect("a number") / exact("3").expect("a number");
+        for (report, expected) in [
+            ("0.333333", true),
+            ("0.3333333", true),
+            ("0.3333334", false),
+            ("0.33", false),
+            ("0.333334", false),
+        ] {
+            assert_eq!(confirms(&exact(report).expect("a number"), &third), expected, "{report}");
+        }
     }
 
     #[test]

@@ -40,18 +40,8 @@ impl<'a> KeeperSession<'a> {
             None => (None, Vec::new()),
             Some(Resumed { journal, answers, .. }) => (Some(journal), answers),
         };
-        let (begun, clock) = (keeper.now(), SystemClock::default());
-        Self {
-            common,
-            keeper,
-            journal,
-            resumed_answers,
-            outlet,
-            clock,
-            begun,
-            has_times: false,
-            blank_lines: 0,
-        }
+        let (begun, has_times, clock) = (keeper.now(), keeper.has_times(), SystemClock::default());
+        Self { common, keeper, journal, resumed_answers, outlet, clock, begun, has_times, blank_lines: 0 }
     }
 
     /// Answers all lines of a file. Filters that become due between two lines are handled together with the later
@@ -77,8 +67,9 @@ impl<'a> KeeperSession<'a> {
             flow = match input {
                 Ok(Input::Line(line, read)) => self.answer_line(&line, read)?,
                 Ok(Input::Failed(message)) => return Err(message.into()),
+                Ok(Input::Panicked(panic)) => std::panic::resume_unwind(panic),
                 Err(RecvTimeoutError::Timeout) => self.elapse()?,
-                Ok(Input::End | Input::Thoughts(_)) | Err(RecvTimeoutError::Disconnected) => break,
+                Ok(Input::End | Input::Searched) | Err(RecvTimeoutError::Disconnected) => break,
             };
         }
         Ok(())

@@ -9,9 +9,10 @@
 //! planning problem cancels the search, but only a few times in a row.
 
 use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel, sync_channel};
 use std::time::{Duration, Instant};
 
 use crate::journal::{Journal, Recovery};
@@ -22,17 +23,31 @@ use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};
 use crate::cli::run_outlet::{Outlet, is_over, unwritten, warn_if_unrecorded};
 
-/// Capacity of the channel of inputs, and maximum length to which `gather` fills the queue of
-/// waiting inputs.
+/// Capacity of the channel of inputs, and maximum length of the queue of waiting inputs.
 pub(super) const MAX_WAITING: usize = 1024;
 
 pub(super) const MIN_PAUSE: Duration = Duration::from_millis(1);
 
 pub(super) enum Input {
     Line(Line, Instant),
-    Thoughts(Thoughts),
+    /// A search has ended. Its result is in a channel of its own, because inputs can fill the queue while a line waits
+    /// for it.
+    Searched,
     End,
     Failed(Message),
+    /// A thread has panicked. The main thread resumes the panic.
+    Panicked(Panic),
+}
+
+type Panic = Box<dyn std::any::Any + Send>;
+
+type SearchResult = Result<Thoughts, Panic>;
+
+/// Sender of inputs, and channel of the results of searches.
+struct Channels {
+    sender: SyncSender<Input>,
+    result_sender: Sender<SearchResult>,
+    results: Receiver<SearchResult>,
 }
 
 #[derive(PartialEq, Eq)]
@@ -83,7 +98,7 @@ impl<'a> Session<'a> {
             None => (None, Vec::new()),
             Some(Resumed { journal, answers, .. }) => (Some(journal), answers),
         };
-        let begun = control.beliefs().now();
+        let (begun, has_times) = (control.beliefs().now(), control.beliefs().has_times());
         let clock = SystemClock::default();
         Self {
             common,
@@ -96,7 +111,7 @@ impl<'a> Session<'a> {
             line,
             open: None,
             search: ParallelSearch::default(),
-            has_times: false,
+            has_times,
             blank_lines: 0,
         }
     }
@@ -116,6 +131,8 @@ impl<'a> Session<'a> {
     pub(super) fn live(mut self, events: Lines) -> Result<(), Failure> {
         let (sender, inputs) = sync_channel(MAX_WAITING);
         read(events, self.common.clone(), sender.clone());
+        let (result_sender, results) = channel();
+        let channels = Channels { sender, result_sender, results };
         let read = Instant::now();
         let answers = std::mem::take(&mut self.resumed_answers);
         self.open = Some((self.number(), read));
@@ -126,16 +143,23 @@ impl<'a> Session<'a> {
             flow = match waiting.pop_front() {
                 Some(Input::Line(line, read)) if self.is_early(&line) => {
                     waiting.push_front(Input::Line(line, read));
-                    self.catch_up(&sender, &inputs, &mut waiting)?
+                    self.catch_up(&channels)?
                 }
                 Some(Input::Line(line, read)) => self.line(&line, read, waiting.is_empty())?,
-                Some(Input::Thoughts(thoughts)) => self.conclude(thoughts)?,
+                // A line that waited for the result may already have used it.
+                Some(Input::Searched) => match channels.results.try_recv() {
+                    Ok(result) => self.conclude(result)?,
+                    Err(_) => Flow::GoesOn,
+                },
                 Some(Input::End) => {
                     is_ended = true;
                     Flow::GoesOn
                 }
                 Some(Input::Failed(message)) => return Err(message.into()),
-                None if self.control.has_agenda() && !self.search.is_running() => self.deliberate(&sender)?,
+                Some(Input::Panicked(panic)) => resume_unwind(panic),
+                None if self.control.has_agenda() && !self.search.is_running() => {
+                    self.deliberate(&channels)?
+                }
                 None if is_ended && !self.search.is_running() => {
                     self.close()?;
                     return Ok(());
@@ -270,46 +294,33 @@ impl<'a> Session<'a> {
     }
 
     /// Advances the pending deliberation before the next line is handled: deliberates at once, starts a search, or
-    /// waits for one further input, such as the result of the search.
-    fn catch_up(
-        &mut self,
-        sender: &SyncSender<Input>,
-        inputs: &Receiver<Input>,
-        waiting: &mut VecDeque<Input>,
-    ) -> Result<Flow, Failure> {
+    /// waits for the result of the search.
+    fn catch_up(&mut self, channels: &Channels) -> Result<Flow, Failure> {
         if !self.search.is_running() {
-            return self.deliberate(sender);
+            return self.deliberate(channels);
         }
-        // The result of the search is handled before the lines that wait for it.
-        let place = waiting.iter().position(|input| matches!(input, Input::Thoughts(_)));
-        match place.and_then(|place| waiting.remove(place)).map_or_else(|| inputs.recv(), Ok) {
-            Ok(Input::Thoughts(thoughts)) => self.conclude(thoughts),
-            Ok(other) => {
-                waiting.push_back(other);
-                Ok(Flow::GoesOn)
-            }
+        match channels.results.recv() {
+            Ok(result) => self.conclude(result),
+            // The session keeps a sender.
             Err(_) => Ok(Flow::GoesOn),
         }
     }
 
-    fn deliberate(&mut self, sender: &SyncSender<Input>) -> Result<Flow, Failure> {
+    fn deliberate(&mut self, channels: &Channels) -> Result<Flow, Failure> {
         if let Some(mut answers) = self.control.deliberate_at_once() {
             self.decided(&mut answers)?;
             return self.say(&answers);
         }
         let thinker = self.control.thinker();
         self.search.begin(thinker.handle());
-        let sender = sender.clone();
-        std::thread::spawn(move || {
-            // The receiver is closed if the run has ended.
-            let _ = sender.send(Input::Thoughts(thinker.think()));
-        });
+        search_in_parallel(channels, move || thinker.think());
         Ok(Flow::GoesOn)
     }
 
     /// Deliberates with the result of another thread. A result for an outdated problem is discarded and the search is
     /// repeated, except after several cancelled searches in a row ([`ParallelSearch`]).
-    fn conclude(&mut self, thoughts: Thoughts) -> Result<Flow, Failure> {
+    fn conclude(&mut self, result: SearchResult) -> Result<Flow, Failure> {
+        let thoughts = result.unwrap_or_else(|panic| resume_unwind(panic));
         let is_late = self.search.accepts_late_plans();
         if self.search.end() {
             return Ok(Flow::GoesOn);
@@ -368,6 +379,16 @@ pub(super) fn flow(written: std::io::Result<()>) -> Result<Flow, Failure> {
     Ok(if is_over(written)? { Flow::Over } else { Flow::GoesOn })
 }
 
+/// Runs a search on another thread, which sends the result or the panic of the search.
+fn search_in_parallel(channels: &Channels, search: impl FnOnce() -> Thoughts + Send + 'static) {
+    let (sender, results) = (channels.sender.clone(), channels.result_sender.clone());
+    std::thread::spawn(move || {
+        // The receivers are closed if the run has ended.
+        let _ = results.send(catch_unwind(AssertUnwindSafe(search)));
+        let _ = sender.send(Input::Searched);
+    });
+}
+
 fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
     while waiting.len() < MAX_WAITING {
         match inputs.try_recv() {
@@ -380,10 +401,11 @@ fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
 pub(super) fn read(mut events: Lines, common: Common, sender: SyncSender<Input>) {
     std::thread::spawn(move || {
         loop {
-            let input = match events.next(&common) {
-                Ok(Some(line)) => Input::Line(line, Instant::now()),
-                Ok(None) => Input::End,
-                Err(message) => Input::Failed(message),
+            let input = match catch_unwind(AssertUnwindSafe(|| events.next(&common))) {
+                Ok(Ok(Some(line))) => Input::Line(line, Instant::now()),
+                Ok(Ok(None)) => Input::End,
+                Ok(Err(message)) => Input::Failed(message),
+                Err(panic) => Input::Panicked(panic),
             };
             let is_last = !matches!(input, Input::Line(..));
             if sender.send(input).is_err() || is_last {
@@ -391,4 +413,21 @@ pub(super) fn read(mut events: Lines, common: Common, sender: SyncSender<Input>)
             }
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::{channel, sync_channel};
+
+    use super::{Channels, Input, search_in_parallel};
+
+    #[test]
+    fn a_panic_of_a_search_is_sent_to_the_session() {
+        let ((sender, inputs), (result_sender, results)) = (sync_channel(1), channel());
+        let channels = Channels { sender, result_sender, results };
+        search_in_parallel(&channels, || panic!("a fault of the planner"));
+        assert!(matches!(inputs.recv(), Ok(Input::Searched)));
+        let panic = channels.results.recv().expect("a result").expect_err("a panic");
+        assert_eq!(panic.downcast_ref(), Some(&"a fault of the planner"));
+    }
 }

@@ -116,6 +116,7 @@ pub struct Keeper {
     pub(super) states: FilterStates,
     pub(super) has_begun: bool,
     pub(super) lines: u64,
+    pub(super) has_times: bool,
     pub(super) now: Duration,
 }
 
@@ -142,6 +143,7 @@ impl Keeper {
             configurator,
             has_begun: false,
             lines: 0,
+            has_times: false,
             now: Duration::ZERO,
         }
     }
@@ -169,6 +171,11 @@ impl Keeper {
     /// Returns the time of the last line or timer event, since the start.
     pub fn now(&self) -> Duration {
         self.now
+    }
+
+    /// Returns `true` if a received line stated its time. Time then advances with lines only.
+    pub fn has_times(&self) -> bool {
+        self.has_times
     }
 
     /// Returns the number of received lines.
@@ -212,6 +219,7 @@ impl Keeper {
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);
+        self.has_times |= observation.time.is_some();
         let (time, refusal_of_time) = time_of_line(self.now, now, observation.time);
         self.now = time;
         // A line that was received before must not have an effect again.

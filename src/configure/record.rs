@@ -108,6 +108,7 @@ fn snapshot(keeper: &Keeper) -> Snapshot {
         "violated": keeper.violated,
         "unserved": keeper.unserved,
         "lines": keeper.lines,
+        "has_times": keeper.has_times,
         "numbers": keeper.numbers.to_record(),
         "now": u64::try_from(keeper.now.as_micros()).unwrap_or(u64::MAX),
         "filters": keeper.states.to_record(),
@@ -139,6 +140,7 @@ fn restore(keeper: &mut Keeper, data: &Value) -> Option<()> {
     keeper.violated = texts(data.get("violated")?)?;
     keeper.unserved = lists(data.get("unserved")?)?;
     keeper.lines = number("lines")?;
+    keeper.has_times = data.get("has_times").and_then(Value::as_bool).unwrap_or_default();
     keeper.numbers = Numbers::from_record(data.get("numbers")?)?;
     keeper.now = Duration::from_micros(number("now")?);
     keeper.states = FilterStates::from_record(data.get("filters")?)?;

@@ -388,6 +388,8 @@ impl Journal {
     fn checkpoint<C: Recoverable>(&mut self, control: &mut C) -> io::Result<()> {
         let next = self.segment + 1;
         let (end, at) = closing(&self.link, self.segment);
+        // A power loss must not leave the next segment without the records that precede it.
+        self.file.sync_data()?;
         let (file, link) = create_segment(&self.directory, &at, &self.digest, next)?;
         self.file.write_all(end.as_bytes())?;
         self.file.sync_data()?;

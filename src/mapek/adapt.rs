@@ -70,7 +70,7 @@ impl Adaptation<'_> {
         // Lost designs do not count: with fewer alternatives, a missing plan stays missing.
         let is_change =
             changes.facts || changes.ended || !changes.reasons.is_empty() || !findings.gained.is_empty();
-        if self.stop_after_failures(&changes, answers) {
+        if self.stop_after_failures(&changes, &findings, answers) {
             return;
         }
         let interruptions = std::mem::take(&mut changes.interruptions);
@@ -99,12 +99,14 @@ impl Adaptation<'_> {
         }
         changes.reasons.extend(interruptions);
         changes.reasons.extend(findings.errors);
+        // Conditions, axioms and the goal can read the availability of designs that no step uses.
+        let is_validated = changes.facts || !findings.lost.is_empty() || !findings.gained.is_empty();
         // After the goal is reached, there is no plan, and the validator checks the goal alone.
-        if self.beliefs.reached && changes.reasons.is_empty() && changes.facts {
+        if self.beliefs.reached && changes.reasons.is_empty() && is_validated {
             let is_undone = self.beliefs.violation().is_some();
             changes.reasons.extend(is_undone.then(|| "the goal does not hold any more".to_owned()));
         }
-        if changes.reasons.is_empty() && changes.facts && self.beliefs.plan.is_some() {
+        if changes.reasons.is_empty() && is_validated && self.beliefs.plan.is_some() {
             changes.reasons.extend(self.beliefs.violation());
         }
         if changes.reasons.is_empty() && self.beliefs.stuck && is_change {
@@ -125,19 +127,26 @@ impl Adaptation<'_> {
         }
     }
 
-    fn stop_after_failures(&mut self, changes: &Changes, answers: &mut Vec<Answer>) -> bool {
-        match &self.beliefs.failures {
-            Some((step, count)) if *count >= MAX_FAILURES && !changes.reasons.is_empty() => {
-                let because = format!("`{}` has failed {count} times in a row", step.summary());
-                answers.push(Answer::PlanNone { status: "failed", because, blocking: Vec::new() });
-                self.beliefs.failures = None;
-                self.beliefs.plan = None;
-                self.beliefs.stuck = true;
-                self.beliefs.retry = None;
-                true
-            }
-            _ => false,
+    /// Drops the plan after too many consecutive failures of one step. Returns `false` if there were fewer, or if
+    /// something else has changed since the last deliberation, so that another plan may succeed.
+    fn stop_after_failures(
+        &mut self,
+        changes: &Changes,
+        findings: &Findings,
+        answers: &mut Vec<Answer>,
+    ) -> bool {
+        let is_due =
+            |(_, count): &mut (PlannedStep, u32)| *count >= MAX_FAILURES && !changes.reasons.is_empty();
+        let Some((step, count)) = self.beliefs.failures.take_if(is_due) else { return false };
+        if changes.news > 1 || changes.reasons.len() > 1 || !findings.is_empty() {
+            return false;
         }
+        let because = format!("`{}` has failed {count} times in a row", step.summary());
+        answers.push(Answer::PlanNone { status: "failed", because, blocking: Vec::new() });
+        self.beliefs.plan = None;
+        self.beliefs.stuck = true;
+        self.beliefs.retry = None;
+        true
     }
 
     fn record_improvement_causes(&mut self, findings: &Findings, changes: &Changes) {
@@ -216,6 +225,8 @@ impl Adaptation<'_> {
         let attempt = retry.map_or(0, |scheduled| scheduled.attempt);
         self.planner.attempt = attempt;
         let mut outcome = self.plan(true);
+        // The absence of a plan for an outdated situation is no reason for a decision.
+        self.planner.is_missing |= self.planner.is_outdated && outcome.steps.is_none();
         if self.planner.is_missing {
             return;
         }
@@ -273,7 +284,8 @@ impl Adaptation<'_> {
     ) -> bool {
         let Some(running) = self.beliefs.running.clone() else { return false };
         let can_go_on = goes_on_with(&running, going_on) || self.can_go_on(&running);
-        if need != Need::Interrupted && can_go_on && (going_on.steps.is_some() || !going_on.proved) {
+        let is_refuted = going_on.steps.is_none() && (going_on.proved || going_on.was_proved);
+        if need != Need::Interrupted && can_go_on && !is_refuted {
             return false;
         }
         let without = self.plan(false);
@@ -311,8 +323,7 @@ impl Adaptation<'_> {
     /// plan found uses an unavailable design.
     pub(super) fn plan(&mut self, goes_on: bool) -> Outcome {
         if let Some(fault) = &self.beliefs.fault {
-            let (because, cost) = (missing_conclusions(fault), BigRational::default());
-            return Outcome { steps: None, cost, proved: false, because, blocking: Vec::new() };
+            return Outcome::no_plan(false, missing_conclusions(fault));
         }
         let problem = self.beliefs.filled();
         let running = self.beliefs.running.as_ref().filter(|_| goes_on);

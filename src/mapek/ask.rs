@@ -15,6 +15,8 @@ pub(crate) struct Outcome {
     pub cost: BigRational,
     /// Whether the plan is proved optimal, or its absence is proved.
     pub proved: bool,
+    /// Whether the absence of a plan was proved before the latest progress of the action under way.
+    pub was_proved: bool,
     pub because: String,
     /// Unavailable designs that block every plan. Empty if not computed, or if there is no plan even with all designs;
     /// see [`planner::Replanner::blocking`].
@@ -48,17 +50,24 @@ impl Question<'_> {
 
 impl Outcome {
     pub(super) fn no_plan(proved: bool, because: String) -> Self {
-        Self { steps: None, cost: BigRational::default(), proved, because, blocking: Vec::new() }
+        let (cost, blocking) = (BigRational::default(), Vec::new());
+        Self { steps: None, cost, proved, was_proved: false, because, blocking }
     }
 
     pub fn to_record(&self) -> Value {
         let steps: Option<Vec<Value>> =
             self.steps.as_ref().map(|steps| steps.iter().map(PlannedStep::to_record).collect());
-        json!([steps, self.cost.to_string(), self.proved, self.because, self.blocking])
+        let mut record = json!([steps, self.cost.to_string(), self.proved, self.because, self.blocking]);
+        if let (true, Value::Array(fields)) = (self.was_proved, &mut record) {
+            fields.push(json!(true));
+        }
+        record
     }
 
     pub fn from_record(record: &Value) -> Option<Self> {
-        let [steps, cost, proved, because, blocking] = record.as_array()?.as_slice() else { return None };
+        let [steps, cost, proved, because, blocking, was_proved @ ..] = record.as_array()?.as_slice() else {
+            return None;
+        };
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let texts = |value: &Value| value.as_array()?.iter().map(text).collect::<Option<Vec<_>>>();
         let steps = match steps {
@@ -69,6 +78,7 @@ impl Outcome {
             steps,
             cost: cost.as_str()?.parse().ok()?,
             proved: proved.as_bool()?,
+            was_proved: was_proved.first().and_then(Value::as_bool).unwrap_or_default(),
             because: because.as_str()?.to_owned(),
             blocking: texts(blocking)?,
         })

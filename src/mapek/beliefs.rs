@@ -54,6 +54,8 @@ pub struct Beliefs {
     pub(super) waits: BTreeMap<u64, Wait>,
     pub(super) reports_actions: bool,
     pub(super) lines: u64,
+    /// Whether a line stated its time, so that time advances with lines only.
+    pub(super) has_times: bool,
     pub(super) numbers: Numbers,
     pub(super) now: Duration,
     /// Time of the last line or timer that was not refused, since the start of the mission.
@@ -149,6 +151,7 @@ impl Beliefs {
             waits: BTreeMap::new(),
             reports_actions: false,
             lines: 0,
+            has_times: false,
             numbers: Numbers::default(),
             now: Duration::ZERO,
             considered: Duration::ZERO,
@@ -250,6 +253,11 @@ impl Beliefs {
     /// Number of received lines, including refused ones. Timers are not counted.
     pub fn lines(&self) -> u64 {
         self.lines
+    }
+
+    /// Returns `true` if a received line stated its time. Time then advances with lines only.
+    pub fn has_times(&self) -> bool {
+        self.has_times
     }
 
     /// Greatest sequence number of an accepted line.

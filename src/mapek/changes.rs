@@ -19,6 +19,9 @@ pub(super) struct Changes {
     /// Whether reported values of the problem differ from the believed ones.
     pub(super) values: bool,
     pub(super) ended: bool,
+    /// Number of observations after which the next deliberation may need a plan.
+    #[serde(default)]
+    pub(super) news: u32,
     /// Whether a function of the action under way was reported with a design that the loop has not requested.
     pub(super) observed: bool,
     /// Reasons why the action under way could not continue unchanged. For each reason, other designs or a suspension
@@ -54,14 +57,26 @@ impl Changes {
     }
 
     pub(super) fn extend(&mut self, later: Self) {
-        let Self { base, facts, predicates, goal, values, ended, observed, interruptions, reasons, filtered } =
-            later;
+        let Self {
+            base,
+            facts,
+            predicates,
+            goal,
+            values,
+            ended,
+            news,
+            observed,
+            interruptions,
+            reasons,
+            filtered,
+        } = later;
         self.base = self.base.max(base);
         self.facts |= facts;
         self.predicates |= predicates;
         self.goal |= goal;
         self.values |= values;
         self.ended |= ended;
+        self.news = self.news.saturating_add(news);
         self.observed |= observed;
         self.interruptions.extend(interruptions);
         self.reasons.extend(reasons);

@@ -203,6 +203,7 @@ impl Loop {
         // Computed plans that no decision has recorded are obsolete.
         self.planner.computed.clear();
         self.beliefs.lines += u64::from(!observation.is_timer);
+        self.beliefs.has_times |= observation.time.is_some();
         let (time, refusal_of_time) = time_of_line(self.beliefs.now, now, observation.time);
         self.beliefs.now = time;
         if let Some(refusal) =
@@ -243,7 +244,8 @@ impl Loop {
             }
             let findings = analyze_change(&mut self.beliefs, changes.base, &mut answers);
             react(&mut self.beliefs, &self.settings, &findings, &mut changes, &mut answers);
-            self.question += u64::from(changes.is_news() || !findings.is_empty());
+            changes.news = u32::from(changes.is_news() || !findings.is_empty());
+            self.question += u64::from(changes.news);
             self.beliefs.considered = self.beliefs.now;
             let agenda = self.agenda.get_or_insert_default();
             agenda.changes.extend(changes);

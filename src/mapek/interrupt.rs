@@ -86,6 +86,7 @@ mod tests {
             steps: is_plan.then(Vec::new),
             cost: BigRational::default(),
             proved,
+            was_proved: false,
             because: "nothing serves".to_owned(),
             blocking: vec!["fd_a".to_owned()],
         }

@@ -105,13 +105,7 @@ impl Live {
 }
 
 fn none(blocking: Vec<String>) -> Outcome {
-    Outcome {
-        steps: None,
-        cost: BigRational::default(),
-        proved: true,
-        because: "no plan reaches the goal".to_owned(),
-        blocking,
-    }
+    Outcome { blocking, ..Outcome::no_plan(true, "no plan reaches the goal".to_owned()) }
 }
 
 /// Returns the remainders of the action under way with their simulated effects, one per executable configuration.

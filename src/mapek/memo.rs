@@ -67,7 +67,7 @@ impl StoredQuestion {
     }
 
     /// Returns `false` if only one of the actions under way is known to have started, and plans depend on this.
-    fn has_equal_start(&self, question: &Question<'_>) -> bool {
+    pub(super) fn has_equal_start(&self, question: &Question<'_>) -> bool {
         let (Some(stored), Some(running)) = (&self.running, question.running) else { return true };
         stored.started == running.started
             || !has_reached_facts(question.mission.domain(), &running.step, question.problem)

@@ -5,7 +5,7 @@
 //! of the former version are taken from the robot, all others from the new version. The plan is not transferred, because
 //! the new version needs another one.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use pddl::ast::InitialElement;
 use serde_json::Value;
@@ -72,6 +72,7 @@ impl Loop {
         let configuration = former.configuration.iter().filter(|(_, design)| has_design(design));
         beliefs.configuration = configuration.map(|(name, design)| (name.clone(), design.clone())).collect();
         (beliefs.actions, beliefs.effects, beliefs.lines) = (former.actions, former.effects, former.lines);
+        beliefs.has_times = former.has_times;
         beliefs.outstanding.clone_from(&former.outstanding);
         beliefs.receipts = former.receipts.clone();
         beliefs.waits.clone_from(&former.waits);
@@ -97,6 +98,7 @@ fn merged(
         records.map(|record| (record[0].to_string(), record)).collect()
     };
     let (former, mut robot) = (by_name(former), by_name(robot));
+    let replaced = replaced_prefixes(&former, &robot);
     let mut init = Vec::new();
     for element in new {
         let Some(record) = element_to_record(element) else {
@@ -109,12 +111,40 @@ fn merged(
             (before, Some(now)) if before != Some(&now) => init.extend(element_from_record(&now)),
             // The element is in the former version, but not in the state of the robot.
             (Some(_), None) => {}
+            // The robot has replaced a fact that the new version replaces, too, for example the place of the robot.
+            (None, None) if prefix(&record).is_some_and(|prefix| replaced.contains(&prefix)) => {}
             _ => init.push(element.clone()),
         }
     }
     let changed = robot.into_iter().filter(|(name, now)| former.get(name) != Some(now));
     init.extend(changed.filter_map(|(_, now)| element_from_record(&now)));
     init
+}
+
+/// Returns the predicate and all arguments but the last of a fact in the form of [`element_to_record`]. Returns `None`
+/// for other elements and for facts without arguments.
+fn prefix(record: &Value) -> Option<String> {
+    let (_, words) = record[0].as_array()?.split_last()?;
+    (record[1] == Value::Bool(true) && !words.is_empty()).then(|| Value::from(words).to_string())
+}
+
+/// Returns the prefixes with which both `former` and `robot` have a single fact, but different ones.
+fn replaced_prefixes(former: &BTreeMap<String, Value>, robot: &BTreeMap<String, Value>) -> BTreeSet<String> {
+    let facts = |elements: &BTreeMap<String, Value>| {
+        let mut facts: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        for (name, record) in elements {
+            if let Some(prefix) = prefix(record) {
+                facts.entry(prefix).or_default().push(name.clone());
+            }
+        }
+        facts
+    };
+    let (before, mut after) = (facts(former), facts(robot));
+    let is_replaced = |(prefix, names): (String, Vec<String>)| {
+        let robot_names = after.remove(&prefix)?;
+        (names.len() == 1 && robot_names.len() == 1 && names != robot_names).then_some(prefix)
+    };
+    before.into_iter().filter_map(is_replaced).collect()
 }
 
 #[cfg(test)]
@@ -154,5 +184,17 @@ mod tests {
         let without = merged(&former, &robot, &init(&[("at a", "true"), ("battery", "100"), ("speed", "1")]));
         let expected = init(&[("battery", "40"), ("speed", "1"), ("at b", "true")]);
         assert_eq!(format!("{without:?}"), format!("{expected:?}"));
+        // The robot is at one place only, also if the new version begins at another one.
+        let moved =
+            merged(&former, &robot, &init(&[("at c", "true"), ("road a b", "true"), ("done a", "true")]));
+        let expected = init(&[("road a b", "true"), ("done a", "true"), ("at b", "true"), ("battery", "40")]);
+        assert_eq!(format!("{moved:?}"), format!("{expected:?}"));
+        // The new version adds a free place. There can be several.
+        let former = init(&[("free a", "true"), ("free b", "true")]);
+        let robot = init(&[("free b", "true"), ("free c", "true")]);
+        let grown =
+            merged(&former, &robot, &init(&[("free a", "true"), ("free b", "true"), ("free d", "true")]));
+        let expected = init(&[("free b", "true"), ("free d", "true"), ("free c", "true")]);
+        assert_eq!(format!("{grown:?}"), format!("{expected:?}"));
     }
 }

@@ -42,7 +42,6 @@ pub(super) struct Monitor {
     pub(super) attributes: BTreeSet<String>,
     /// Attributes whose measured value cannot have an effect. Their measurements are refused.
     pub(super) unused_attributes: BTreeSet<String>,
-    checked: HashSet<String>,
     pub(super) filters: Filters,
     pub(super) components: HashMap<String, String>,
 }
@@ -56,7 +55,7 @@ impl Monitor {
             kinds.iter().filter(|kind| !filters.has(&kind.name) && !mission.uses_measurement(&kind.name));
         let unused_attributes = unused_kinds.flat_map(|kind| [kind.iri.clone(), kind.name.clone()]).collect();
         let attributes = kinds.into_iter().flat_map(|kind| [kind.iri, kind.name]).collect();
-        Self { attributes, unused_attributes, checked: HashSet::new(), filters, components: HashMap::new() }
+        Self { attributes, unused_attributes, filters, components: HashMap::new() }
     }
 
     pub(super) fn filters(&self) -> &Filters {
@@ -100,7 +99,8 @@ impl BeliefUpdate<'_> {
             Event::Started { action } => self.confirm_started(*action).map(|_| ()),
             Event::Progress { action, fraction } => {
                 self.confirm_started(*action)?.progressed = true;
-                self.progress(fraction).map(|_| ())
+                self.progress(fraction);
+                Ok(())
             }
             Event::Succeeded { action } => self.succeeded(*action),
             Event::Failed { action, reason } => {
@@ -237,10 +237,12 @@ impl BeliefUpdate<'_> {
         let delete = delta.delete.iter().map(|fact| (fact, false));
         for (fact, is_insertion) in insert.chain(delete) {
             let name = name(fact);
+            // The analysis determines whether plans depend on a change of these properties.
             if WATCHED.contains(&name) {
                 self.changes.base = Base::Watched;
+            } else {
+                self.changes.facts |= PLANNED.contains(&name) || self.beliefs.mission.contains_fact(fact);
             }
-            self.changes.facts |= PLANNED.contains(&name);
             if VALUE_PROPERTIES.contains(&name) {
                 // A derived value is an estimation, which plans depend on. A reported value is a measurement.
                 self.changes.facts |=
@@ -284,7 +286,7 @@ impl BeliefUpdate<'_> {
         self.beliefs.confirm_request(request);
         // Completes the remaining increases and decreases. The report of success counts even if conditions are
         // violated.
-        let advance = self.progress(&BigRational::from_integer(1.into()))?;
+        let advance = self.progress(&BigRational::from_integer(1.into()));
         let running = self.end(action)?;
         if let Some(mut advance) = advance {
             // Gradual changes were applied with the progress.
@@ -324,9 +326,9 @@ impl BeliefUpdate<'_> {
 
     /// Sets the progress of the action under way, and applies the share of its increases and decreases since the
     /// previous progress. Returns the effects of the whole action.
-    fn progress(&mut self, fraction: &BigRational) -> Result<Option<Advance>, Refusal> {
+    fn progress(&mut self, fraction: &BigRational) -> Option<Advance> {
         let advance = self.advance();
-        let Some(running) = &mut self.beliefs.running else { return Ok(None) };
+        let running = self.beliefs.running.as_mut()?;
         let increment = fraction - &running.progress;
         running.progress.clone_from(fraction);
         let gradual = gradual_functions(self.beliefs.mission.domain(), &running.step);
@@ -334,14 +336,15 @@ impl BeliefUpdate<'_> {
         for change in advance.iter().flat_map(|advance| &advance.values).filter(is_gradual) {
             let name = change.text.trim_matches(['(', ')']);
             if let (Some(now), Some(before)) = (self.beliefs.mission.value(name), &change.before) {
-                let value = number::rounded(&(&now + (&change.after - before) * &increment));
-                self.set(name, &number::decimal(&value))?;
+                // The value is exact, so that the end of the action has the effects that were planned.
+                let value = number::bounded(&now + (&change.after - before) * &increment);
+                self.beliefs.mission.set_number(name, value.clone());
                 if let Some(running) = &mut self.beliefs.running {
                     *running.applied.entry(name.to_owned()).or_default() += value - now;
                 }
             }
         }
-        Ok(advance)
+        advance
     }
 
     /// Returns the effects of a complete execution of the action under way, regardless of its conditions. They are those
@@ -378,8 +381,9 @@ impl BeliefUpdate<'_> {
                 format!("the value of {name} is `{value}`, but should be {}", number::DECIMAL),
             )
         };
-        let value = number::rounded(&number::exact(value).ok_or_else(wrong)?);
-        if self.beliefs.mission.value(&name).as_ref() != Some(&value) {
+        let value = number::reported(&number::exact(value).ok_or_else(wrong)?);
+        // A report of the believed value, which can have more decimals, is not a change.
+        if self.beliefs.mission.value(&name).is_none_or(|believed| !number::confirms(&value, &believed)) {
             self.set(&name, &number::decimal(&value))?;
             self.changes.facts = true;
             self.changes.values = true;
@@ -387,23 +391,23 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    /// Sets a fact or a value of the problem. Returns `true` if this changes the believed state. If a fact or function
-    /// that was not checked before does not fit the domain, restores the previous state and returns a refusal.
+    /// Sets a fact or a value of the problem. Returns `true` if this changes the believed state. If the new fact or value
+    /// does not fit the domain and the objects, restores the previous state and returns a refusal.
     fn set(&mut self, name: &str, value: &str) -> Result<bool, Refusal> {
         let mission = &mut self.beliefs.mission;
-        let key = if mission.is_function(name) { name.to_owned() } else { format!("{name} {value}") };
-        let is_checked = self.monitor.checked.contains(&key);
-        let before = if is_checked { Vec::new() } else { mission.problem().init.clone() };
+        let before = mission.problem().init.clone();
         let is_change = mission.set_in_problem(name, value).map_err(|message| fault(&message))?;
-        if is_checked || !is_change {
-            return Ok(is_change);
-        }
-        if let Err(messages) = mission.filled() {
+        // A fact can also be removed.
+        let is_addition =
+            || mission.is_function(name) || mission.holds(name) || mission.holds(&format!("{name} {value}"));
+        if is_change
+            && is_addition()
+            && let Err(messages) = mission.check_last_element()
+        {
             mission.set_init(before);
             return Err(first(&messages));
         }
-        self.monitor.checked.insert(key);
-        Ok(true)
+        Ok(is_change)
     }
 }
 

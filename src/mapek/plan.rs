@@ -39,6 +39,14 @@ pub(crate) struct Planner {
     pub question_log: Option<Vec<(StoredQuestion, Outcome)>>,
     /// Planning problems with outcomes that another thread has computed, in order.
     pub prepared: VecDeque<(StoredQuestion, Outcome)>,
+    /// Whether the situation may have changed since the prepared outcomes were computed, other than by progress of the
+    /// action under way.
+    pub is_late: bool,
+    /// Whether the last outcome is prepared and about another situation than the question, from which the situation
+    /// differs by more than progress of the action under way.
+    pub is_outdated: bool,
+    /// Whether a prepared outcome with a plan was about another situation than the question.
+    pub has_outdated_plan: bool,
     pub live: Live,
     pub memo: Memo,
     pub watch: Watch,
@@ -48,6 +56,7 @@ impl Planner {
     /// Returns an outcome that is recorded (for replay), prepared by another thread, or cached. Otherwise searches for
     /// a plan. If searches are forbidden, sets `is_missing` and returns an outcome without a plan.
     pub fn plan(&mut self, question: &Question<'_>) -> Outcome {
+        self.is_outdated = false;
         // Recorded and prepared outcomes have an order. Therefore, they are consumed even if the memo has the answer.
         let recorded = self.recorded.pop_front().or_else(|| self.prepared(question));
         let stored_outcome = recorded.or_else(|| self.memo.recall(question));
@@ -65,7 +74,8 @@ impl Planner {
 
     /// Removes and returns the next outcome computed by another thread. Returns `None` without a next outcome, or if
     /// the outcome is about a different action under way. If the situation has changed, for example by progress of the
-    /// action, the outcome no longer counts as proved.
+    /// action, the outcome no longer counts as proved. Progress alone is no reason to doubt that no plan continues the
+    /// action, so the outcome states whether this was proved.
     fn prepared(&mut self, question: &Question<'_>) -> Option<Outcome> {
         let (answered, mut outcome) = self.prepared.pop_front()?;
         if !answered.has_same_action(question) {
@@ -74,8 +84,11 @@ impl Planner {
         if answered.equals(question) {
             self.memo.store(question, &outcome);
         } else {
-            outcome.proved = false;
+            self.is_outdated = self.is_late || !answered.has_equal_start(question);
+            self.has_outdated_plan |= outcome.steps.is_some();
+            let was_proved = std::mem::take(&mut outcome.proved);
             if outcome.steps.is_none() {
+                outcome.was_proved = was_proved && !self.is_outdated;
                 "no plan was found for an earlier situation".clone_into(&mut outcome.because);
                 outcome.blocking.clear();
             }
@@ -125,8 +138,7 @@ pub(super) fn from_scratch(question: &Question<'_>, limits: Limits, watch: &Watc
             cost: number::of_plan(&plan.cost),
             steps: Some(plan.steps.iter().map(|step| PlannedStep::new(question.mission, step)).collect()),
             proved: status == Status::Optimal,
-            because: String::new(),
-            blocking: Vec::new(),
+            ..no_plan(false, String::new())
         },
         (Status::Unsolvable, None) => no_plan(true, "no plan reaches the goal".to_owned()),
         _ => no_plan(false, "no plan was found within the limits".to_owned()),

@@ -121,6 +121,7 @@ pub(super) fn fields(beliefs: &Beliefs) -> Map<String, Value> {
         "waits": beliefs.waits.iter().map(|(number, entry)| json!([number, microseconds(entry.since), entry.repeats])).collect::<Vec<_>>(),
         "reports_actions": beliefs.reports_actions,
         "lines": beliefs.lines,
+        "has_times": beliefs.has_times,
         "numbers": beliefs.numbers.to_record(),
         "now": microseconds(beliefs.now),
         "considered": microseconds(beliefs.considered),
@@ -203,6 +204,7 @@ fn restore_work(beliefs: &mut Beliefs, data: &Value) -> Option<()> {
     beliefs.improvement_since = Duration::from_micros(number("hoped")?);
     (beliefs.actions, beliefs.effects, beliefs.lines) =
         (number("actions")?, number("effects")?, number("lines")?);
+    beliefs.has_times = truth("has_times").unwrap_or_default();
     beliefs.numbers = Numbers::from_record(data.get("numbers")?)?;
     beliefs.now = Duration::from_micros(number("now")?);
     beliefs.considered = Duration::from_micros(number("considered")?);

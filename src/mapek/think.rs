@@ -3,8 +3,8 @@
 //! The copy records each planning problem (*question*) with its outcome. If no observation has changed the
 //! question in the meantime, the loop uses the recorded outcomes without a search. Progress of the action under
 //! way, ticks, and repeated reports do not change the question; after such progress, however, the plan is no
-//! longer reported as optimal. Plans for a changed question are used only after several cancelled searches in a
-//! row, and only if they fit the situation.
+//! longer reported as optimal, or its absence as proved. Plans for a changed question are used only after several
+//! cancelled searches in a row, and only if they fit the situation. The absence of such a plan is never used.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -185,17 +185,55 @@ impl Loop {
         }
         // A checkpoint covers only changes before the first plan. Therefore, the whole loop is copied.
         let before = self.clone();
+        self.planner.is_late = !self.is_answered_by(&thoughts);
         self.planner.prepared = thoughts.answers.into();
         self.planner.forbids_search = true;
         let answers = self.deliberate();
-        // A late plan may not fit the current situation.
-        let misfits = || self.beliefs.plan.is_some() && self.beliefs.violation().is_some();
+        // A plan for an earlier situation may not fit the current one. A plan that was kept although it does not fit is
+        // no reason to search again.
+        let misfits = || {
+            self.planner.has_outdated_plan
+                && self.beliefs.plan.is_some()
+                && self.beliefs.violation().is_some()
+        };
         if self.planner.is_missing || misfits() {
             *self = before;
             return None;
         }
         self.planner.forbids_search = false;
+        self.planner.has_outdated_plan = false;
         self.planner.prepared.clear();
         Some(answers)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::time::Duration;
+
+    use crate::mapek::control::Loop;
+    use crate::mapek::event::Observation;
+    use crate::setup::Setup;
+
+    /// Otherwise, the same search would be repeated without end.
+    #[test]
+    fn a_kept_plan_that_does_not_fit_is_no_reason_to_search_again() {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
+        let Setup { mission, settings, .. } = Setup::read(&manifest).expect("the mission is read");
+        let mut control = Loop::new(mission, settings.with_settle(Duration::ZERO)).expect("a loop");
+        control.start();
+        let nowhere =
+            control.beliefs.mission.goal("(and (robot_at wp1) (not (robot_at wp1)))").expect("a goal");
+        control.beliefs.mission.set_goal(nowhere);
+        control.beliefs.improvement_causes.insert("facts".to_owned());
+        control.react(&Observation::parse(r#"{"event":"tick"}"#), Duration::from_secs(1));
+        assert!(control.beliefs.violation().is_some());
+        assert!(control.deliberate_at_once().is_none(), "a search is needed");
+        let thoughts = control.thinker().think();
+        let answers = control.deliberate_with(thoughts, false).expect("the search has an answer");
+        let kinds: Vec<_> = answers.iter().map(|answer| answer.to_json()["answer"].clone()).collect();
+        assert_eq!(kinds, ["plan_requested", "plan_kept"]);
+        assert!(!control.has_agenda());
     }
 }

@@ -260,7 +260,7 @@ impl World {
         for change in advance.values.iter_mut().filter(|change| is_gradual(change)) {
             let name = change.text.trim_matches(['(', ')']);
             if let (Some(now), Some(before)) = (self.truth.value(name), &change.before) {
-                change.after = number::rounded(&(&now + (&change.after - before) * &share));
+                change.after = number::bounded(&now + (&change.after - before) * &share);
                 *job.applied.entry(name.to_owned()).or_default() += &change.after - now;
             }
         }
@@ -277,7 +277,8 @@ impl World {
             self.lost |= is_lifeline && change.after <= BigRational::default();
             let name = change.text.trim_matches(['(', ')']).to_owned();
             if !whole {
-                events.push(Event::Fact { name, value: number::decimal(&change.after) });
+                let value = number::decimal(&number::rounded(&change.after));
+                events.push(Event::Fact { name, value });
             }
         }
     }

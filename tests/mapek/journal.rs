@@ -219,3 +219,55 @@ fn a_journal_of_another_mission_is_refused() {
     let message = refused.expect_err("another mission's journal").message.clone();
     assert!(message.contains("belongs to another mission"), "{message}");
 }
+
+/// A power loss during a checkpoint can leave the new segment, without records, and remove the last records of the old
+/// one, with which it begins.
+#[test]
+fn a_segment_that_a_checkpoint_has_begun_is_not_needed() {
+    let pristine = control("ugv");
+    let (state, effects, _directory) = undisturbed(&pristine);
+    let directory = tempfile::tempdir().expect("a directory");
+    let (mut journal, mut control, _, answers) = open(directory.path(), &pristine);
+    let mut robot = Robot::default();
+    robot.take(&control, &answers);
+    let count = POLICY.snapshot_every as usize;
+    for line in &script()[..count] {
+        let answers = journal.handle(&mut control, line, Duration::ZERO).expect("written");
+        robot.take(&control, &answers);
+    }
+    drop(journal);
+    std::fs::remove_file(directory.path().join("snapshot-000001")).expect("a snapshot");
+    let cut = |name: &str, keep: &dyn Fn(usize) -> usize| {
+        let file = directory.path().join(name);
+        let text = std::fs::read_to_string(&file).expect("a segment");
+        let lines: Vec<&str> = text.split_inclusive('\n').collect();
+        std::fs::write(&file, lines[..keep(lines.len())].concat()).expect("written");
+    };
+    cut("journal-000001", &|_| 1);
+    // The `end` record and the last event with its decision are missing.
+    cut("journal-000000", &|lines| lines - 3);
+    let (mut journal, mut control, recovery, answers) = open(directory.path(), &pristine);
+    let warnings: Vec<String> = recovery.warnings.iter().map(|warning| warning.message.clone()).collect();
+    assert!(warnings.iter().any(|text| text.contains("records of the journal are missing")), "{warnings:?}");
+    let mut robot = Robot { effects: received(&pristine)[count - 1].clone() };
+    robot.take(&control, &answers);
+    go_on(&mut journal, &mut control, &mut robot);
+    assert_eq!(self::state(&control), state);
+    assert_eq!(robot.needed(), effects.needed());
+    drop(journal);
+    open(directory.path(), &pristine);
+}
+
+/// The time of lines with times must not advance by the clock after a restart.
+#[test]
+fn a_restored_loop_knows_that_lines_have_times() {
+    let pristine = control("ugv");
+    for (line, expected) in [(r#"{"event":"tick"}"#, false), (r#"{"event":"tick","time":3}"#, true)] {
+        let mut control = pristine.clone();
+        assert!(!control.beliefs().has_times());
+        crate::common::feed(&mut control, line);
+        let mut restored = pristine.clone();
+        restored.restore(&control.snapshot()).expect("the snapshot fits");
+        assert_eq!([control.beliefs().has_times(), restored.beliefs().has_times()], [expected; 2]);
+    }
+}

@@ -2,6 +2,7 @@
 //! experiments event by event, acknowledgements, faults and noise, the journals under crashes and damage, and
 //! random events.
 
+mod changes;
 mod common;
 mod configure;
 mod damage;

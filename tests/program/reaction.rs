@@ -2,6 +2,8 @@
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
@@ -166,4 +168,52 @@ fn scripts_can_be_piped_in() {
     ];
     let kinds: Vec<&String> = kinds.iter().filter(|kind| !kind.contains("planning")).collect();
     assert_eq!(kinds, expected);
+}
+
+/// Without lines, no time passes in a mission whose lines state times, also after a restart.
+#[test]
+fn the_clock_does_not_replace_the_times_of_lines_after_a_restart() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let manifest = directory.path().join("ugv.toml");
+    let text = std::fs::read_to_string(root().join("missions/ugv.toml")).expect("a manifest");
+    let text = text.replace("\"../", &format!("\"{}/", root().display()));
+    std::fs::write(&manifest, text + "\n[adaptation]\ndeadline = 0.2\ndeadline_factor = 0.001\n")
+        .expect("a file");
+    let (manifest, journal) = (manifest.display().to_string(), directory.path().join("journal"));
+    let journal = journal.display().to_string();
+    let mut run = Run::new(&[&manifest, "--journal", &journal]);
+    run.send(r#"{"event":"action_started","action":1,"time":0.1}"#);
+    run.send(r#"{"event":"action_progress","action":1,"fraction":0.1,"time":0.2}"#);
+    run.until(is_answer("handled", 2));
+    run.end();
+    let resumed = Run::new(&[&manifest, "--journal", &journal]);
+    resumed.until(|answer| answer["answer"] == "ready");
+    std::thread::sleep(Duration::from_secs(1));
+    let answers = resumed.end();
+    assert!(answers.iter().all(|answer| answer["answer"] != "overdue"), "{answers:?}");
+}
+
+/// Lines behind a line that waits for the first plan stay in the pipe, not in memory.
+#[test]
+fn few_lines_are_read_while_a_line_waits_for_a_plan() {
+    const LINES: u64 = 6000;
+    let mut run = Run::new(&["tests/program/ferry/mission.toml"]);
+    run.send(r#"{"event":"action_started","action":1}"#);
+    let note = format!(r#"{{"event":"note","text":"{}"}}"#, "x".repeat(1000));
+    let sent = Arc::new(AtomicU64::new(0));
+    let (counter, mut input) = (Arc::clone(&sent), run.input);
+    let writer = std::thread::spawn(move || {
+        for _ in 0..LINES {
+            writeln!(input, "{note}").expect("the program reads");
+            counter.fetch_add(1, Ordering::Relaxed);
+        }
+    });
+    let is_planned = |(_, answer): &(Instant, Value)| answer["answer"] == "plan_found";
+    assert!(run.answers.iter().any(|answer| is_planned(&answer)));
+    // The queue and the channel contain 1024 lines each, and buffers some more.
+    assert!(sent.load(Ordering::Relaxed) < LINES / 2, "{sent:?}");
+    writer.join().expect("all lines are read");
+    let last = run.answers.iter().last().expect("answers");
+    assert_eq!(last.1["line"], LINES + 1);
+    assert!(run.child.wait().expect("the program ends").success());
 }

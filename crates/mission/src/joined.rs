@@ -262,6 +262,21 @@ impl Mission {
         diagnostics
     }
 
+    /// Checks the last element of the initial state, which a setting has added, against the domain and the objects.
+    ///
+    /// # Errors
+    /// Unknown symbols or objects, or arguments of other types or of another number.
+    pub fn check_last_element(&self) -> Result<(), Errors> {
+        let Some(element) = self.problem.init.last() else { return Ok(()) };
+        let mut diagnostics =
+            pddl::check_element(&self.domain, &self.current(), element, &self.problem_source);
+        diagnostics.retain(|diagnostic| diagnostic.severity == Severity::Error);
+        let (contributed, located) = by_origin(diagnostics);
+        let mut messages = Message::from_pddl(&located, &[&self.problem_source]);
+        messages.extend(contributed.iter().map(|(code, text)| Message::error(code, text)));
+        Errors::unless_empty(messages)
+    }
+
     /// Returns the predicates of the knowledge base and of numeric comparisons that complete a domain
     /// in PLANTA's form. Includes those that the domain declares itself. `None` for other missions.
     pub fn completed_predicates(&self) -> Option<&HashSet<Name>> {

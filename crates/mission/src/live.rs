@@ -6,8 +6,10 @@ use std::sync::Arc;
 
 use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
+use ontology::vocab::local_name;
 use pddl::ast::{Atom, Condition, Declaration, Domain, InitialElement, Name, Problem, Term};
 use pddl::{self, Severity, Source};
+use rules::Fact;
 
 use crate::binding;
 use crate::joined::Mission;
@@ -81,6 +83,19 @@ impl Mission {
     pub fn uses_measurement(&self, attribute: &str) -> bool {
         self.knowledge.as_ref().is_some_and(|knowledge| knowledge.uses_measurement(attribute))
             || !self.fed_by(attribute).is_empty()
+    }
+
+    /// Returns `true` if a fact of the knowledge base can be part of the filled problem by its predicate: a class that is
+    /// bound to a type, or in PLANTA's form a predicate that the domain file uses.
+    pub fn contains_fact(&self, fact: &Fact) -> bool {
+        let Some(engine) = self.knowledge.as_ref().map(Knowledge::engine) else { return false };
+        if let Some(planta) = &self.planta {
+            return planta.uses(fact, engine);
+        }
+        let iri = engine.symbols().value(fact.predicate).as_name().unwrap_or_default();
+        let is_class = |class: String| class == *iri || class == local_name(iri);
+        let mut types = self.domain.types.iter().map(|declared| &declared.identifier.name);
+        fact.arguments.len() == 1 && types.any(|name| self.bindings.class(name).is_some_and(is_class))
     }
 
     /// Returns `true` if the domain has a numeric function, given as `name arguments`, with this

@@ -117,14 +117,26 @@ impl Mission {
                 format!("the value `{value}` of {function} is not a decimal number"),
             ));
         };
+        Ok(self.assign(function, arguments, number))
+    }
+
+    /// Sets the value of a numeric function of the problem, given as `name arguments`, to an exact number.
+    pub fn set_number(&mut self, name: &str, number: BigRational) {
+        let words: Vec<Name> = name.split_whitespace().map(Name::new).collect();
+        if let Some((function, arguments)) = words.split_first() {
+            self.assign(function, arguments, number);
+        }
+    }
+
+    fn assign(&mut self, function: &Name, arguments: &[Name], number: BigRational) -> bool {
         let is_target = |element: &InitialElement| matches!(element, InitialElement::Value(a, _, _) if same_atom(a, function, arguments));
         let is_equal = |element: &InitialElement| matches!(element, InitialElement::Value(_, value, _) if *value == number);
         if self.has_only(is_target, is_equal) {
-            return Ok(false);
+            return false;
         }
-        let value = InitialElement::Value(constants(function, arguments), number, Span::default());
+        let value = InitialElement::Value(constants(function, arguments), number.clone(), Span::default());
         self.replace(is_target, Some(value));
-        Ok(true)
+        true
     }
 
     fn set_fact(&mut self, predicate: &Name, arguments: &[Name], holds: bool) -> bool {

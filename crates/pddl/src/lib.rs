@@ -32,7 +32,7 @@ mod validator;
 pub mod visit;
 
 pub use ::num_rational::BigRational;
-pub use check::{check, check_domain, check_goal};
+pub use check::{check, check_domain, check_element, check_goal};
 pub use codes::CODES;
 pub use diagnostic::{Diagnostic, Errors, Severity, has_errors, render};
 pub use excerpt::{Excerpt, Shown};

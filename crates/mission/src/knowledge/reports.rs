@@ -24,8 +24,7 @@ impl Knowledge {
     /// fails, the report is kept as pending, and the returned change is empty.
     ///
     /// # Errors
-    /// There is no such component, attribute or design. Also if a pending objective has an unknown function or design;
-    /// the report is applied nevertheless.
+    /// There is no such component, attribute or design.
     pub fn take(&mut self, name: &str, report: RobotReport) -> Result<Delta, Message> {
         let component = self.component(name);
         let name = if matches!(report, RobotReport::Component(_)) { component.as_str() } else { name };
@@ -39,7 +38,9 @@ impl Knowledge {
                 self.waiting.fault = None;
                 self.follow(&delta);
                 if let Some(objectives) = self.waiting.objectives.take() {
-                    self.pursue_in_time(&objectives)?;
+                    // Only objectives of a former version of the mission can have unknown names. They are dropped, because
+                    // an error would say that the report has changed nothing.
+                    let _ = self.pursue_in_time(&objectives);
                 }
                 Ok(delta)
             }
@@ -118,12 +119,12 @@ impl Knowledge {
     pub fn take_over(&mut self, mut waiting: Waiting) {
         let engine = self.runtime.engine_mut();
         waiting.reports.retain(|(name, report)| report.update(engine, name).is_ok());
-        // The errors below are unknown names of pending objectives.
         if let Some((name, report)) = waiting.reports.pop() {
             self.waiting = waiting;
             let _ = self.take(&name, report);
         } else {
             self.waiting = Waiting::default();
+            // Objectives with unknown names are dropped.
             let _ = waiting.objectives.map(|objectives| self.pursue_in_time(&objectives));
         }
     }

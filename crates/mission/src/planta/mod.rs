@@ -58,6 +58,8 @@ pub(crate) struct Planta {
     number: Name,
     /// Predicates of the knowledge base and of numeric comparisons.
     known: HashSet<Name>,
+    /// Predicates that the domain file uses.
+    used: Arc<BTreeSet<Name>>,
 }
 
 impl Planta {
@@ -87,7 +89,15 @@ impl Planta {
         completed.derived = rules.collect();
         let predicates =
             terms_of_mission.predicates.keys().cloned().chain([LESS, EQUAL].map(Name::new)).collect();
-        (Self { terms: Arc::new(terms_of_mission), number, known: predicates }, completed, warnings)
+        let used = Arc::new(Mentioned::by_domain(domain).predicates);
+        (Self { terms: Arc::new(terms_of_mission), number, known: predicates, used }, completed, warnings)
+    }
+
+    /// Returns `true` if the domain file uses the predicate of a fact: as an assertion, or as an assertion or inference.
+    pub(crate) fn uses(&self, fact: &Fact, engine: &Engine) -> bool {
+        let predicate =
+            engine.symbols().value(fact.predicate).as_name().and_then(|iri| self.terms.symbols.get(iri));
+        predicate.is_some_and(|name| self.used.contains(name) || self.used.contains(&names::inferred(name)))
     }
 
     pub(crate) fn known(&self) -> &HashSet<Name> {

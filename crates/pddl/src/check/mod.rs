@@ -10,7 +10,7 @@ mod symbols;
 
 use rustc_hash::FxHashSet;
 
-use super::ast::{Domain, Metric, Name, Problem, Span, TypedName};
+use super::ast::{Domain, InitialElement, Metric, Name, Problem, Span, TypedName};
 use super::diagnostic::{Diagnostic, Severity, Sink};
 use super::source::Source;
 use symbols::Symbols;
@@ -65,6 +65,19 @@ pub fn check_goal(domain: &Domain, problem: &Problem, source: &Source) -> Vec<Di
     let symbols = Symbols::of(domain, Some(problem));
     let mut checker = Checker::new(&symbols, source);
     checker.goal(&problem.goal);
+    checker.sink.finish()
+}
+
+/// Checks only one element of the initial state of a problem. Returns errors and warnings.
+pub fn check_element(
+    domain: &Domain,
+    problem: &Problem,
+    element: &InitialElement,
+    source: &Source,
+) -> Vec<Diagnostic> {
+    let symbols = Symbols::of(domain, Some(problem));
+    let mut checker = Checker::new(&symbols, source);
+    checker.initial_state(std::slice::from_ref(element));
     checker.sink.finish()
 }
 

@@ -1,0 +1,266 @@
+//! Tests of changes between two decisions: exact values after progress, plans of another thread after progress,
+//! designs that only conditions read, reports that arrive together with a failure, and facts that rules infer.
+
+use std::time::Duration;
+
+use metaplan::mapek::{Answer, Loop, Observation, Settings};
+use metaplan::setup::Setup;
+use num_rational::BigRational;
+
+use crate::common::{control, feed, kinds, own, plain};
+
+fn react(control: &mut Loop, line: &str) -> Vec<Answer> {
+    let now = control.beliefs().now() + Duration::from_millis(100);
+    control.react(&Observation::parse(line), now)
+}
+
+fn progress(action: u64, fraction: &str) -> String {
+    format!(r#"{{"event":"action_progress","action":{action},"fraction":{fraction}}}"#)
+}
+
+fn fact(name: &str, value: &str) -> String {
+    format!(r#"{{"event":"fact_changed","name":"{name}","value":{value}}}"#)
+}
+
+fn component(component: &str, status: &str) -> String {
+    format!(r#"{{"event":"component_status","component":"{component}","status":"{status}"}}"#)
+}
+
+fn has(answers: &[Answer], kind: &str) -> bool {
+    kinds(answers).iter().any(|found| found == kind)
+}
+
+fn number(numerator: i64, denominator: i64) -> BigRational {
+    BigRational::new(numerator.into(), denominator.into())
+}
+
+/// Returns a loop, not started, whose plan moves along `count` roads and needs the whole battery.
+fn journey(count: u32, battery: &str, energy: &str) -> Loop {
+    let domain = format!(
+        "(define (domain d) (:requirements :strips :typing :fluents) (:types place)
+          (:predicates (at ?p - place) (road ?a ?b - place)) (:functions (battery))
+          (:action go :parameters (?a ?b - place)
+            :precondition (and (at ?a) (road ?a ?b) (>= (battery) {energy}))
+            :effect (and (not (at ?a)) (at ?b) (decrease (battery) {energy}))))"
+    );
+    let places: Vec<String> = (0..=count).map(|place| format!("p{place}")).collect();
+    let roads: Vec<String> =
+        places.windows(2).map(|pair| format!("(road {} {})", pair[0], pair[1])).collect();
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects {} - place) (:init (at p0) (= (battery) {battery}) {})
+          (:goal (at p{count})))",
+        places.join(" "),
+        roads.join(" ")
+    );
+    plain(&domain, &problem)
+}
+
+/// The plan is made with exact numbers, so its execution must be believed with exact numbers, too.
+#[test]
+fn a_plan_that_needs_the_whole_battery_is_executed() {
+    for (count, battery, energy) in [(2, "0.6666668", "0.3333334"), (6, "1", "(/ 1 6)")] {
+        for fractions in [&[][..], &["0.37"], &["0.1", "0.23", "0.9"]] {
+            let mut control = journey(count, battery, energy);
+            control.start();
+            for action in 1..=count {
+                for fraction in fractions {
+                    assert_eq!(feed(&mut control, &progress(action.into(), fraction)), Vec::new());
+                }
+                let answers =
+                    feed(&mut control, &format!(r#"{{"event":"action_succeeded","action":{action}}}"#));
+                let expected = if action == count { "goal_reached" } else { "request_action" };
+                assert_eq!(kinds(&answers), [expected], "{battery} {fractions:?}: {answers:?}");
+            }
+            assert_eq!(control.beliefs().mission().value("battery"), Some(number(0, 1)), "{fractions:?}");
+        }
+    }
+}
+
+#[test]
+fn reported_values_are_exact_unless_they_are_long() {
+    let mut control = journey(6, "1", "(/ 1 6)");
+    control.start();
+    for (report, expected) in [
+        ("0.0000004", number(4, 10_000_000)),
+        ("2.3333334", number(23_333_334, 10_000_000)),
+        ("1.30000000000000004", number(13, 10)),
+    ] {
+        feed(&mut control, &fact("battery", report));
+        assert_eq!(control.beliefs().mission().value("battery"), Some(expected), "{report}");
+    }
+    // The believed value is 1.3 - 1/12. A report of this value changes nothing.
+    feed(&mut control, &progress(1, "0.5"));
+    let question = control.question();
+    assert_eq!(feed(&mut control, &fact("battery", "1.216667")), Vec::new());
+    assert_eq!(control.question(), question);
+    assert_eq!(control.beliefs().mission().value("battery"), Some(number(13, 10) - number(1, 12)));
+    feed(&mut control, &fact("battery", "1.216668"));
+    assert_eq!(control.beliefs().mission().value("battery"), Some(number(1_216_668, 1_000_000)));
+}
+
+const ROADS: &str = "(define (domain d) (:requirements :strips :typing) (:types place)
+  (:predicates (at ?p - place) (road ?a ?b - place))
+  (:action move :parameters (?a ?b - place) :precondition (and (at ?a) (road ?a ?b))
+    :effect (and (not (at ?a)) (at ?b))))";
+
+fn crossroads(roads: &str, goal: &str) -> Loop {
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects b c d - place) (:init (at b) {roads}) (:goal (at {goal})))"
+    );
+    plain(ROADS, &problem)
+}
+
+/// The goal is reachable only if the action under way, which leads into a dead end, is cancelled. Progress arrives
+/// during the search.
+#[test]
+fn an_action_is_cancelled_although_it_has_progressed_during_the_search() {
+    let mut control = crossroads("(road b c) (road b d)", "c");
+    control.start();
+    feed(&mut control, r#"{"event":"action_started","action":1}"#);
+    react(&mut control, r#"{"event":"goal_changed","goal":"(at d)"}"#);
+    let thoughts = control.thinker().think();
+    react(&mut control, &progress(1, "0.1"));
+    let mut replayed = control.clone();
+    let answers = control.deliberate_with(thoughts, false).expect("the search has an answer");
+    assert_eq!(kinds(&answers), ["plan_requested", "cancel_action"], "{answers:?}");
+    // A journal records the plans of the other thread.
+    let plans = control.decision(&answers).plans;
+    assert_eq!(replayed.deliberate_again(&plans), answers);
+    assert_eq!(replayed.snapshot(), control.snapshot());
+}
+
+#[test]
+fn the_absence_of_a_plan_in_an_earlier_situation_is_not_used() {
+    let mut control = crossroads("(road b c)", "d");
+    assert!(has(&control.start(), "plan_none"));
+    react(&mut control, &fact("road d b", "true"));
+    let thoughts = control.thinker().think();
+    react(&mut control, &fact("road b d", "true"));
+    assert!(control.deliberate_with(thoughts, true).is_none());
+    assert!(control.has_agenda());
+    assert!(has(&control.deliberate(), "plan_found"));
+}
+
+/// Only conditions, not the configuration of a step, mention the lost design.
+#[test]
+fn a_lost_design_that_a_condition_or_the_goal_reads_leads_to_a_plan() {
+    let domain = "(define (domain d) (:requirements :strips :typing :disjunctive-preconditions)
+      (:types function functiondesign) (:constants fd_amcl_kinect - functiondesign)
+      (:predicates (ready) (loaded) (done) (fd_available ?d - functiondesign))
+      (:action go :parameters () :precondition (and) :effect (ready))
+      (:action upload :parameters () :precondition (and (ready) (fd_available fd_amcl_kinect)) :effect (done))
+      (:action load :parameters () :precondition (ready) :effect (loaded))
+      (:action carry :parameters () :precondition (loaded) :effect (done)))";
+    let problem = |goal: &str| format!("(define (problem p) (:domain d) (:init) (:goal {goal}))");
+    let mut control = own(domain, &problem("(done)"), "");
+    control.start();
+    assert_eq!(control.beliefs().plan().expect("a plan").count(), 1);
+    let answers = feed(&mut control, &component("c_kinect", "FALSE"));
+    assert!(has(&answers, "plan_found") && !has(&answers, "plan_kept"), "{answers:?}");
+    let steps: Vec<&str> =
+        control.beliefs().plan().expect("a plan").map(|step| step.action.as_str()).collect();
+    assert_eq!(steps, ["load", "carry"]);
+
+    let mut control = own(domain, &problem("(or (done) (fd_available fd_amcl_kinect))"), "");
+    assert!(control.start().contains(&Answer::GoalReached));
+    let answers = feed(&mut control, &component("c_kinect", "FALSE"));
+    assert!(has(&answers, "request_action"), "{answers:?}");
+}
+
+#[test]
+fn a_report_that_arrives_with_the_third_failure_leads_to_a_plan() {
+    for line in
+        [component("c_kinect", "FALSE"), r#"{"event":"goal_changed","goal":"(robot_at wp3)"}"#.to_owned()]
+    {
+        let mut ugv = control("ugv");
+        ugv.start();
+        let failure = |action: u64| format!(r#"{{"event":"action_failed","action":{action}}}"#);
+        feed(&mut ugv, &failure(1));
+        feed(&mut ugv, &failure(2));
+        let mut alone = ugv.clone();
+        assert_eq!(kinds(&feed(&mut alone, &failure(3))), ["plan_none"], "{line}");
+        react(&mut ugv, &failure(3));
+        react(&mut ugv, &line);
+        let answers = ugv.deliberate();
+        assert!(has(&answers, "request_action") && !has(&answers, "plan_none"), "{line}: {answers:?}");
+    }
+}
+
+const KNOWLEDGE: &str = "@prefix : <http://example.org/m#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix t: <http://metacontrol.org/tomasys#> .
+<http://example.org/m> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .
+:OpenPlace a owl:Class . :ClosedPlace a owl:Class . :wp5 a :ClosedPlace .
+:light a t:QualityAttributeType .
+:obs_light a t:QAvalue ; t:isQAtype :light ; t:isMeasured true ; t:hasValue 0.5 .
+";
+
+const RULES: &str = "@prefix : <http://example.org/m#> .
+@prefix t: <http://metacontrol.org/tomasys#> .
+[open] t:hasValue(:obs_light, ?v) ^ swrlb:greaterThan(?v, 0.8) -> :OpenPlace(:wp5) .
+";
+
+fn lighted(domain: &str, problem: &str, bindings: &str) -> Loop {
+    let directory = tempfile::tempdir().expect("a directory");
+    let manifest = format!(
+        "name = 'own'\n[knowledge]\nfiles = ['kb.ttl']\nrules = ['coadaptation', 'own.swrl']
+         [planning]\ndomain = 'domain.pddl'\nproblem = 'problem.pddl'\n{bindings}\n"
+    );
+    let files =
+        [("kb.ttl", KNOWLEDGE), ("own.swrl", RULES), ("domain.pddl", domain), ("problem.pddl", problem)];
+    for (name, text) in files {
+        std::fs::write(directory.path().join(name), text).expect("a file");
+    }
+    let setup = Setup::parse("m.toml", &manifest, directory.path());
+    Loop::new(setup.expect("the mission is read").mission, Settings::immediate()).expect("a loop")
+}
+
+fn light(value: &str) -> String {
+    format!(r#"{{"event":"measured","attribute":"light","value":{value}}}"#)
+}
+
+/// Returns a loop, not started, in which a rule infers the only object that can be visited.
+fn open_place() -> Loop {
+    let domain = "(define (domain d) (:requirements :strips :typing :existential-preconditions) (:types open)
+      (:predicates (visited ?p - open) (lit))
+      (:action visit :parameters (?p - open) :precondition (and) :effect (visited ?p)))";
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (exists (?p - open) (visited ?p))))";
+    lighted(domain, problem, "[bindings]\nopen = 'class:OpenPlace'")
+}
+
+#[test]
+fn inferred_objects_and_measured_facts_lead_to_a_plan() {
+    // In PLANTA's form, a condition can read a measured value.
+    let domain = "(define (domain d) (:requirements :strips :typing) (:predicates (done))
+      (:action go :parameters () :precondition (hasValue obs_light 0.9_decimal) :effect (done)))";
+    let planta = lighted(domain, "(define (problem p) (:domain d) (:init) (:goal (done)))", "");
+    for mut control in [open_place(), planta] {
+        let answers = control.start();
+        assert!(has(&answers, "plan_none"), "{answers:?}");
+        let answers = feed(&mut control, &light("0.9"));
+        assert!(has(&answers, "request_action"), "{answers:?}");
+    }
+}
+
+/// An object that is not inferred any more is refused, also if it was accepted before, and only in reports about it.
+#[test]
+fn a_reported_fact_is_checked_in_the_present_situation() {
+    let mut control = open_place();
+    let is_refused = |control: &mut Loop, name: &str, value: &str| {
+        let answers = react(control, &fact(name, value));
+        answers.iter().any(|answer| matches!(answer, Answer::Error { .. }))
+    };
+    assert!(is_refused(&mut control, "visited wp5", "true"));
+    react(&mut control, &light("0.9"));
+    assert!(!is_refused(&mut control, "visited wp5", "true"));
+    assert!(!is_refused(&mut control, "visited wp5", "false"));
+    let mut restored = open_place();
+    restored.restore(&control.snapshot()).expect("the snapshot fits");
+    for control in [&mut control, &mut restored] {
+        assert!(!is_refused(control, "visited wp5", "true"));
+        react(control, &light("0.1"));
+        assert!(!is_refused(control, "lit", "true"), "this report is about another fact");
+        assert!(!is_refused(control, "visited wp5", "false"));
+        assert!(is_refused(control, "visited wp5", "true"));
+    }
+}
