@@ -10,7 +10,7 @@ use metaplan::message::Errors;
 use metaplan::mission::{Bindings, Mission, Planning as _};
 use metaplan::setup::Setup;
 use ontology::ReadOptions;
-use pddl::Source;
+use pddl::{Source, Validator, print_domain};
 use planner::{Config, Limits, Status, lexicographic};
 use rules::Limits as StepLimits;
 use testing::random::Random;
@@ -327,6 +327,83 @@ fn a_context_that_ends_at_the_start_of_an_action_counts() {
         (:durative-action enter :parameters () :duration (= ?duration 1) :condition (at start (open))
           :effect (and (at start (not (open))) (at end (done)) (at end (increase (total-cost) (effort))))))";
     check_small(CONTEXT, domain, &[], "2", &["fd_b"]);
+}
+
+/// A mission with one action, which takes `duration` and has the designs and the bound of `knowledge`.
+fn timed(knowledge: &str, duration: &str, span: &str) -> Mission {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let knowledge = format!("{PREFIX}{knowledge}\n:fd_b t:requiresC :c . :c a t:Component .");
+    let domain = format!(
+        "(define (domain d) (:requirements :durative-actions :numeric-fluents) (:predicates (open) (done))
+           (:functions (total-cost) (span) (effort))
+           (:durative-action enter :parameters () :duration (= ?duration {duration}) :condition (at start (open))
+             :effect (and (at end (done)) (at end (increase (total-cost) (effort))))))"
+    );
+    let problem = format!(
+        "(define (problem p) (:domain d) (:init (= (total-cost) 0) (= (span) {span}) (open)) (:goal (done))
+           (:metric minimize (total-cost)))"
+    );
+    let mission = read(directory.path(), &knowledge, &domain, &problem, &BTreeMap::new());
+    mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}"))
+}
+
+/// Returns the designs of an optimal plan, or `None` if there is no plan.
+fn designs(mission: &Mission) -> Option<Vec<String>> {
+    let (status, cost, steps) = answer(mission);
+    assert!([Status::Optimal, Status::Unsolvable].contains(&status), "{status:?}");
+    cost.map(|_| steps.into_iter().flatten().map(|(_, design)| design).collect())
+}
+
+/// Conditions over all do not apply to the duration 0. Only the design `fd_b` meets the bound. Each case has the
+/// duration with `fd_a` and with `fd_b`.
+#[test]
+fn designs_are_required_at_the_start_of_an_action_that_may_take_no_time() {
+    let everywhere = CONTEXT.replace(" ; t:inContext \"open\"", "");
+    for knowledge in [CONTEXT, &everywhere] {
+        for (duration, span, durations) in [
+            ("0", "0", [0, 0]),
+            ("(span)", "0", [0, 0]),
+            ("(* 2 (span))", "0", [0, 0]),
+            ("(- (effort) 1)", "3", [0, 1]),
+            ("2", "0", [2, 2]),
+            ("(span)", "3", [3, 3]),
+            ("(+ 1 (span))", "0", [1, 1]),
+            ("(* (span) (effort))", "3", [3, 6]),
+        ] {
+            let mut mission = timed(knowledge, duration, span);
+            assert_eq!(designs(&mission), Some(vec!["fd_b".to_owned()]), "{duration}");
+            let is_valid = |mission: &Mission, design: &str, duration: i32| {
+                let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
+                let plan = Source::new("plan", format!("0: (enter {design}) [{duration}]"));
+                Validator::new(mission.domain(), &problem).validate(&plan).expect("a plan").valid
+            };
+            let validity =
+                [is_valid(&mission, "fd_a", durations[0]), is_valid(&mission, "fd_b", durations[1])];
+            assert_eq!(validity, [false, true], "{duration}");
+            // The form of missions without the duration 0 has no superfluous conditions.
+            let text = print_domain(mission.domain());
+            let starts =
+                ["(at start (fd_available ", "(at start (fd_solve_f "].map(|part| text.matches(part).count());
+            assert_eq!(starts, [usize::from(durations[0] == 0), 1], "{text}");
+            mission.fail("c").expect("a component");
+            assert_eq!(designs(&mission), None, "{duration}");
+            assert!(!is_valid(&mission, "fd_b", durations[1]), "{duration}");
+        }
+    }
+}
+
+#[test]
+fn conditions_on_designs_follow_the_durations_of_the_situation() {
+    let text = |mission: &Mission| print_domain(mission.domain());
+    let mut mission = timed(CONTEXT, "(span)", "3");
+    let positive = text(&mission);
+    mission.set("span", "0").expect("a value");
+    assert_ne!(text(&mission), positive);
+    assert_eq!(text(&mission), text(&timed(CONTEXT, "(span)", "0")));
+    mission.fail("c").expect("a component");
+    assert_eq!(designs(&mission), None);
+    mission.set("span", "3").expect("a value");
+    assert_eq!(text(&mission), positive);
 }
 
 /// One function with one design. The statements of a test are added to these.

@@ -57,7 +57,7 @@ impl Mission {
 
     /// Returns the knowledge base for modification, if the mission has one.
     pub fn knowledge_mut(&mut self) -> Option<&mut Knowledge> {
-        self.current.take();
+        self.forget();
         self.knowledge.as_mut()
     }
 
@@ -174,7 +174,7 @@ impl Mission {
             let fact = |design: &&str| InitialElement::Fact(binding::atom(predicate, &[design]));
             problem.init.extend(allowed.iter().map(fact));
         }
-        Cow::Borrowed(&self.domain)
+        Cow::Borrowed(self.domain())
     }
 
     /// Returns the number of parameters of an action in the domain file if the knowledge base has
@@ -191,13 +191,13 @@ impl Mission {
 
     /// Replaces the initial state of the problem.
     pub fn set_init(&mut self, init: Vec<InitialElement>) {
-        self.current.take();
+        self.forget();
         self.problem.init = init;
     }
 
     /// Replaces the goal.
     pub fn set_goal(&mut self, goal: Condition) {
-        self.current.take();
+        self.forget();
         self.problem.goal = goal;
     }
 
