@@ -240,6 +240,24 @@ fn classes_required_by_one_action_do_not_guard_facts_of_others() {
     assert_eq!(comparison.least_steps, Some(2));
 }
 
+/// A variable of a rule may have the name of another rule's variable, followed by `~` and a number.
+#[test]
+fn variables_of_unfolded_rules_are_not_merged() {
+    let knowledge = knowledge(
+        "ClassAssertion(:Cc :i1) ClassAssertion(:Ce :i2) ObjectPropertyAssertion(:pb :i1 :i2)
+         DLSafeRule(Body(ObjectPropertyAtom(:pa Variable(:x) Variable(<urn:v#x~1>))) Head(ClassAtom(:Ca Variable(:x))))
+         DLSafeRule(Body(ObjectPropertyAtom(:pb Variable(:y) Variable(:x)) ClassAtom(:Cc Variable(:z)))
+           Head(ObjectPropertyAtom(:pa Variable(:y) Variable(:z))))\n",
+    );
+    let domain = "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x))
+ (:action a :parameters (?x ?y) :precondition (Ca ?x) :effect (pa ?x ?y))
+ (:action b :parameters (?x) :precondition (inferred-Ca ?x) :effect (done ?x)))\n"
+        .to_owned();
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i1)))\n".to_owned();
+    let comparison = compare(&Texts { knowledge, domain, problem }, "unfolded rules").expect("few states");
+    assert_eq!(comparison.least_steps, Some(1));
+}
+
 #[test]
 fn names_of_companions_can_be_predicates_of_the_domain() {
     let knowledge = knowledge("ClassAssertion(:Ca :i1)\n");
