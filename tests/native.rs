@@ -10,7 +10,7 @@ use metaplan::message::Errors;
 use metaplan::mission::{Bindings, Mission, Planning as _};
 use metaplan::setup::Setup;
 use ontology::ReadOptions;
-use pddl::Source;
+use pddl::{Source, Validator, print_domain};
 use planner::{Config, Limits, Status, lexicographic};
 use rules::Limits as StepLimits;
 use testing::random::Random;
@@ -293,8 +293,7 @@ fn check_small(knowledge: &str, domain: &str, bindings: &[(&str, &str)], cost: &
     let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0) (open)) (:goal (done))
         (:metric minimize (total-cost)))";
     let bindings = bindings.iter().map(|(symbol, query)| ((*symbol).to_owned(), (*query).to_owned()));
-    let knowledge = format!("{PREFIX}{knowledge}");
-    let mission = read(directory.path(), &knowledge, domain, problem, &bindings.collect());
+    let mission = read(directory.path(), knowledge, domain, problem, &bindings.collect());
     let (status, actual, steps) =
         answer(&mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}")));
     assert_eq!((status, actual.as_deref()), (Status::Optimal, Some(cost)), "{domain}");
@@ -313,11 +312,12 @@ fn a_change_to_a_design_without_an_estimation_is_free() {
                 :effect (and (done) (increase (total-cost) 1) (increase (total-cost) (change)))))"
         )
     };
+    let knowledge = format!("{PREFIX}{CHANGE}");
     let bindings = [("change", "reconfigured:start"), ("used", "chosen:start")];
-    check_small(CHANGE, &domain("(change)", "0"), &bindings[..1], "2", &["fd_lidar", "fd_camera"]);
+    check_small(&knowledge, &domain("(change)", "0"), &bindings[..1], "2", &["fd_lidar", "fd_camera"]);
     // The chosen design of `first` costs 4. A sum over chosen designs is undefined without an estimation, so it has
     // another function than the sum over newly chosen designs.
-    check_small(CHANGE, &domain("(change) (used)", "(used)"), &bindings, "6", &["fd_lidar", "fd_camera"]);
+    check_small(&knowledge, &domain("(change) (used)", "(used)"), &bindings, "6", &["fd_lidar", "fd_camera"]);
 }
 
 #[test]
@@ -326,7 +326,111 @@ fn a_context_that_ends_at_the_start_of_an_action_counts() {
         (:functions (total-cost) (effort))
         (:durative-action enter :parameters () :duration (= ?duration 1) :condition (at start (open))
           :effect (and (at start (not (open))) (at end (done)) (at end (increase (total-cost) (effort))))))";
-    check_small(CONTEXT, domain, &[], "2", &["fd_b"]);
+    check_small(&format!("{PREFIX}{CONTEXT}"), domain, &[], "2", &["fd_b"]);
+}
+
+/// A mission with one action, which takes `duration` and has the designs and the bound of `knowledge`.
+fn timed(knowledge: &str, duration: &str, span: &str) -> Mission {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let knowledge = format!("{PREFIX}{knowledge}\n:fd_b t:requiresC :c . :c a t:Component .");
+    let domain = format!(
+        "(define (domain d) (:requirements :durative-actions :numeric-fluents) (:predicates (open) (done))
+           (:functions (total-cost) (span) (effort))
+           (:durative-action enter :parameters () :duration (= ?duration {duration}) :condition (at start (open))
+             :effect (and (at end (done)) (at end (increase (total-cost) (effort))))))"
+    );
+    let problem = format!(
+        "(define (problem p) (:domain d) (:init (= (total-cost) 0) (= (span) {span}) (open)) (:goal (done))
+           (:metric minimize (total-cost)))"
+    );
+    let mission = read(directory.path(), &knowledge, &domain, &problem, &BTreeMap::new());
+    mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}"))
+}
+
+/// Returns the designs of an optimal plan, or `None` if there is no plan.
+fn designs(mission: &Mission) -> Option<Vec<String>> {
+    let (status, cost, steps) = answer(mission);
+    assert!([Status::Optimal, Status::Unsolvable].contains(&status), "{status:?}");
+    cost.map(|_| steps.into_iter().flatten().map(|(_, design)| design).collect())
+}
+
+/// Conditions over all do not apply to the duration 0. Only the design `fd_b` meets the bound. Each case has the
+/// duration with `fd_a` and with `fd_b`.
+#[test]
+fn designs_are_required_at_the_start_of_an_action_that_may_take_no_time() {
+    let everywhere = CONTEXT.replace(" ; t:inContext \"open\"", "");
+    for knowledge in [CONTEXT, &everywhere] {
+        for (duration, span, durations) in [
+            ("0", "0", [0, 0]),
+            ("(span)", "0", [0, 0]),
+            ("(* 2 (span))", "0", [0, 0]),
+            ("(- (effort) 1)", "3", [0, 1]),
+            ("2", "0", [2, 2]),
+            ("(span)", "3", [3, 3]),
+            ("(+ 1 (span))", "0", [1, 1]),
+            ("(* (span) (effort))", "3", [3, 6]),
+        ] {
+            let mut mission = timed(knowledge, duration, span);
+            assert_eq!(designs(&mission), Some(vec!["fd_b".to_owned()]), "{duration}");
+            let is_valid = |mission: &Mission, design: &str, duration: i32| {
+                let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
+                let plan = Source::new("plan", format!("0: (enter {design}) [{duration}]"));
+                Validator::new(mission.domain(), &problem).validate(&plan).expect("a plan").valid
+            };
+            let validity =
+                [is_valid(&mission, "fd_a", durations[0]), is_valid(&mission, "fd_b", durations[1])];
+            assert_eq!(validity, [false, true], "{duration}");
+            // The form of missions without the duration 0 has no superfluous conditions.
+            let text = print_domain(mission.domain());
+            let starts =
+                ["(at start (fd_available ", "(at start (fd_solve_f "].map(|part| text.matches(part).count());
+            assert_eq!(starts, [usize::from(durations[0] == 0), 1], "{text}");
+            mission.fail("c").expect("a component");
+            assert_eq!(designs(&mission), None, "{duration}");
+            assert!(!is_valid(&mission, "fd_b", durations[1]), "{duration}");
+        }
+    }
+}
+
+#[test]
+fn conditions_on_designs_follow_the_durations_of_the_situation() {
+    let text = |mission: &Mission| print_domain(mission.domain());
+    let mut mission = timed(CONTEXT, "(span)", "3");
+    let positive = text(&mission);
+    mission.set("span", "0").expect("a value");
+    assert_ne!(text(&mission), positive);
+    assert_eq!(text(&mission), text(&timed(CONTEXT, "(span)", "0")));
+    mission.fail("c").expect("a component");
+    assert_eq!(designs(&mission), None);
+    mission.set("span", "3").expect("a value");
+    assert_eq!(text(&mission), positive);
+}
+
+/// No design of `f1` has an estimation of the bounded attribute, so the bound does not apply to `f1`. The design `fd_a`
+/// also serves `f2`, to which the bound applies.
+#[test]
+fn a_bound_applies_to_the_functions_with_estimations() {
+    // TOMASys itself admits only one function per design.
+    let prefix = PREFIX.replace(" ; owl:imports <http://metacontrol.org/tomasys>", "");
+    let knowledge = ":f1 a t:Function . :f2 a t:Function . :safety a t:QualityAttributeType .
+        :careful a t:Requirement ; t:isQAtype :safety ; t:hasMinimum 0.5 .
+        :a_first a t:Action ; t:requiresF :f1 ; t:requiresQuality :careful .
+        :a_second a t:Action ; t:requiresF :f2 ; t:requiresQuality :careful .
+        :a_both a t:Action ; t:requiresF :f1 , :f2 ; t:requiresQuality :careful .
+        :fd_a a t:FunctionDesign ; t:solvesF :f1 , :f2 .
+        :fd_b a t:FunctionDesign ; t:solvesF :f2 ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :safety ; t:hasValue 0.9 ] .";
+    let domain = |actions: &str| {
+        format!("(define (domain d) (:predicates (open) (one) (done)) (:functions (total-cost)) {actions})")
+    };
+    let first =
+        "(:action first :parameters () :precondition (open) :effect (and (one) (increase (total-cost) 1)))";
+    let second =
+        "(:action second :parameters () :precondition (one) :effect (and (done) (increase (total-cost) 1)))";
+    let both =
+        "(:action both :parameters () :precondition (open) :effect (and (done) (increase (total-cost) 1)))";
+    let knowledge = format!("{prefix}{knowledge}");
+    check_small(&knowledge, &domain(&format!("{first} {second}")), &[], "2", &["fd_a", "fd_b"]);
+    check_small(&knowledge, &domain(both), &[], "1", &["fd_a", "fd_b"]);
 }
 
 /// One function with one design. The statements of a test are added to these.

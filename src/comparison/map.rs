@@ -220,7 +220,7 @@ impl<'t> Map<'t> {
 /// Greatest number of corridors that a warning lists.
 const MAX_LISTED: usize = 5;
 
-/// Lists corridors for a warning. `None` if there are none.
+/// Lists corridors for a warning. Returns `None` for an empty set.
 fn listed(corridors: &BTreeSet<(&str, &str)>) -> Option<String> {
     let names = corridors.iter().take(MAX_LISTED).map(|(from, to)| format!("`{from}`-`{to}`"));
     let names: Vec<String> = names.collect();

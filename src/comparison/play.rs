@@ -199,7 +199,7 @@ mod tests {
     use crate::comparison::coadaptation::{Arc, Coadaptation, Configuration, Traversal};
     use crate::comparison::process::{Action, REWARDS, Risk};
 
-    /// The fractions of the values are so long that exact arithmetic exceeds its budget.
+    /// The budget of exact arithmetic does not suffice for the long fractions of the values.
     #[test]
     fn long_plans_have_the_values_of_the_formulas() {
         const MOVES: usize = 300;

@@ -219,8 +219,9 @@ impl Clause {
     }
 
     /// Replaces the atom at position `at` of the body by the body of `by`, a clause for the atom's predicate.
-    /// The variables of `by` are renamed with the suffix `~depth`. Returns `None` if the atom and the head of
-    /// `by` do not unify, or if the result contains an inequality that can never hold.
+    /// The variables of `by` are renamed with a blank and `depth` as a suffix; names in PDDL have no blank. Returns
+    /// `None` if the atom and the head of `by` do not unify, or if the result contains an inequality that can never
+    /// hold.
     pub fn unfolded(&self, at: usize, by: &Self, depth: usize) -> Option<Self> {
         let Literal::Holds(_, operands_of_atom) = &self.body[at] else { return None };
         let operands = by.body.iter().flat_map(Literal::operands).chain(&by.arguments);
@@ -229,7 +230,7 @@ impl Clause {
             Operand::Constant(_) => None,
         });
         let fresh = names.map(|name| {
-            let renamed = Name::new(&format!("{name}~{depth}"));
+            let renamed = Name::new(&format!("{name} {depth}"));
             (name, Operand::Variable(renamed))
         });
         let by = by.clone().with(&fresh.collect());

@@ -79,3 +79,24 @@ fn verdicts_state_the_subject_of_the_certificate() {
         "{of_mission:#?}"
     );
 }
+
+/// The optimum of another metric says nothing about the mission. The metric does not matter if there is no plan.
+#[test]
+fn certificates_of_other_metrics_are_not_about_the_mission() {
+    let of_mission = "(+ (* 100 (total-time)) (battery_used))";
+    for (metric, situation, is_about_mission) in [
+        (of_mission, &[][..], true),
+        ("battery_used", &[], false),
+        ("battery_used", &["--set", "battery=7"], true),
+    ] {
+        let directory = tempfile::tempdir().expect("a directory");
+        let arguments = [&["plan", "missions/ugv.toml", "--minimize", metric], situation].concat();
+        let target = certificate(directory.path(), &arguments);
+        assert_eq!(verify_in(&root(), &[&target]).status, 0, "{metric} {situation:?}");
+        let arguments = [&["verify", target.as_str(), "--mission", "missions/ugv.toml"], situation].concat();
+        let outcome = metaplan(&arguments);
+        assert_eq!(outcome.status == 0, is_about_mission, "{outcome:#?}");
+        let reason = "failed: it is not about `ugv` as it is now: the metric differs (`--minimize`)";
+        assert_eq!(!outcome.stdout.contains(reason), is_about_mission, "{outcome:#?}");
+    }
+}

@@ -27,8 +27,11 @@ pub struct Mission {
     pub(super) problem_source: Source,
     pub(super) domain: Domain,
     pub(super) problem: Problem,
-    /// The filled problem. Every method that changes the problem or the knowledge base empties it.
+    /// The filled problem. Every method that changes the problem or the knowledge base calls [`Self::forget`].
     pub(super) current: OnceLock<Arc<Problem>>,
+    /// The domain with conditions on designs at the start of actions whose duration may be 0 in the current situation.
+    /// `None` if there is no such action. Emptied like `current`.
+    instantaneous: OnceLock<Option<Arc<Domain>>>,
     pub(super) adaptation: Option<CoAdaptation>,
     /// Designs whose availability is stated by the problem, not inferred from the knowledge base.
     pub(super) own: BTreeSet<Name>,
@@ -146,6 +149,7 @@ impl Mission {
             domain,
             problem,
             current: OnceLock::new(),
+            instantaneous: OnceLock::new(),
             adaptation,
             own: problem_designs,
             never_named,
@@ -182,7 +186,7 @@ impl Mission {
     /// The knowledge base has no such component, inference exceeds its limits, or the mission has no knowledge
     /// base.
     pub fn fail(&mut self, component: &str) -> Result<(), Message> {
-        self.current.take();
+        self.forget();
         match &mut self.knowledge {
             Some(knowledge) => knowledge.fail(component),
             None => Err(Message::error(
@@ -195,7 +199,7 @@ impl Mission {
     /// Finds the first atom with this predicate in the conjunction of the goal and replaces its last argument
     /// by `object`. If there is no such atom, the goal is unchanged.
     pub fn aim(&mut self, predicate: &str, object: &str) {
-        self.current.take();
+        self.forget();
         let mut parts = vec![&mut self.problem.goal];
         // Popping from a stack with reversed pushes visits the atoms in their textual order.
         while let Some(part) = parts.pop() {
@@ -317,11 +321,19 @@ impl Mission {
         self.bindings.solves()
     }
 
-    /// Returns the domain. A plain domain (without a type of designs) is returned in its explicit
-    /// form, with design parameters. A domain in PLANTA's form is returned with the declarations of
-    /// the knowledge base.
+    /// Empties the caches, which a change of the problem or the knowledge base makes outdated.
+    pub(super) fn forget(&mut self) {
+        self.current.take();
+        self.instantaneous.take();
+    }
+
+    /// Returns the domain. A plain domain (without a type of designs) is returned in its explicit form, with design
+    /// parameters, for the durations in the current situation. A domain in PLANTA's form is returned with the
+    /// declarations of the knowledge base.
     pub fn domain(&self) -> &Domain {
-        &self.domain
+        let Some(adaptation) = &self.adaptation else { return &self.domain };
+        let instantaneous = || adaptation.with_starts(&self.domain, &self.current()).map(Arc::new);
+        self.instantaneous.get_or_init(instantaneous).as_deref().unwrap_or(&self.domain)
     }
 
     /// Parses an objective: an expression as in a PDDL metric, or the name of a function without

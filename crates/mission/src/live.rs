@@ -61,7 +61,7 @@ impl Mission {
 
     /// Returns the knowledge base for modification, if the mission has one.
     pub fn knowledge_mut(&mut self) -> Option<&mut Knowledge> {
-        self.current.take();
+        self.forget();
         self.knowledge.as_mut()
     }
 
@@ -202,7 +202,7 @@ impl Mission {
             let fact = |design: &&str| InitialElement::Fact(binding::atom(predicate, &[design]));
             problem.init.extend(allowed.iter().map(fact));
         }
-        Cow::Borrowed(&self.domain)
+        Cow::Borrowed(self.domain())
     }
 
     /// Withdraws from a filled problem and its `domain` that designs solve functions, given by their names: each of the
@@ -239,13 +239,13 @@ impl Mission {
 
     /// Replaces the initial state of the problem.
     pub fn set_init(&mut self, init: Vec<InitialElement>) {
-        self.current.take();
+        self.forget();
         self.problem.init = init;
     }
 
     /// Replaces the goal.
     pub fn set_goal(&mut self, goal: Condition) {
-        self.current.take();
+        self.forget();
         self.problem.goal = goal;
     }
 

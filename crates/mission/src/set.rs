@@ -22,7 +22,7 @@ impl Mission {
     /// exceeds its limits, or the knowledge base decides on the availability of the design or states a fact that the
     /// setting would remove.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), Message> {
-        self.current.take();
+        self.forget();
         let value = value.trim();
         if let Some(knowledge) = &mut self.knowledge
             && knowledge.has_attribute(name.trim())
@@ -180,7 +180,7 @@ impl Mission {
     }
 
     fn replace(&mut self, is_target: impl Fn(&InitialElement) -> bool, replacement: Option<InitialElement>) {
-        self.current.take();
+        self.forget();
         self.problem.init.retain(|element| !is_target(element));
         self.problem.init.extend(replacement);
     }

@@ -3,12 +3,16 @@
 use mission::Mission;
 use mission::knowledge::rule_text;
 use ontology::OutputSyntax;
+use pddl::ast::Problem;
 use pddl::{print_domain, print_problem};
 
 use crate::knowledge::{KnowledgeFiles, ORIGIN, Origin, first_message};
+use crate::manifest::Claim;
+use crate::task::read_pddl;
 
 /// Returns a confirmation, or the first difference as an error.
 pub(crate) fn about(
+    claim: &Claim,
     certified: Option<&KnowledgeFiles<'_>>,
     (domain, problem): (&str, &str),
     mission: &Mission,
@@ -46,6 +50,14 @@ pub(crate) fn about(
     }
     if print_problem(mission.problem()) != origin.problem || base.statements() != origin.changes {
         return mismatch("the problem or the situation (`--scenario`, `--set`, `--fail`) differs");
+    }
+    // The metric does not matter if there is no plan. A front states its objectives.
+    if matches!(claim, Claim::Optimal { .. }) {
+        let (_, planned) = read_pddl(domain, problem)?;
+        let with_metric = Problem { metric: planned.metric, ..mission.problem().clone() };
+        if print_problem(&with_metric) != origin.problem {
+            return mismatch("the metric differs (`--minimize`)");
+        }
     }
     Ok(confirmation)
 }

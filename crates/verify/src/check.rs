@@ -73,7 +73,7 @@ impl<'a> Verifier<'a> {
             Ok((manifest, contents)) => {
                 let mut report = self.report(manifest.claim.clone(), &manifest.files);
                 report.parts.extend(parts(self.directory, &manifest, &contents, &|| self.is_over()));
-                report.parts.extend(self.about_mission(&contents));
+                report.parts.extend(self.about_mission(&manifest.claim, &contents));
                 report
             }
             Err(reason) => unreadable(reason),
@@ -94,7 +94,7 @@ impl<'a> Verifier<'a> {
         report.parts.extend(origin_parts(&contents, &domain, &problem));
         let texts = (text(&contents, DOMAIN), &domain, &problem);
         report.parts.extend(front::check(self.directory, &front, texts, &|| self.is_over()));
-        report.parts.extend(self.about_mission(&contents));
+        report.parts.extend(self.about_mission(&Claim::Front(front), &contents));
         report
     }
 
@@ -111,9 +111,9 @@ impl<'a> Verifier<'a> {
     }
 
     /// Compares the certificate with the mission. Returns `None` without a mission.
-    fn about_mission(&self, contents: &[(String, String)]) -> Option<VerifiedPart> {
+    fn about_mission(&self, claim: &Claim, contents: &[(String, String)]) -> Option<VerifiedPart> {
         let texts = (text(contents, DOMAIN), text(contents, PROBLEM));
-        let result = about(written(contents).as_ref(), texts, self.mission?);
+        let result = about(claim, written(contents).as_ref(), texts, self.mission?);
         Some(VerifiedPart { part: "mission", result })
     }
 

@@ -6,7 +6,8 @@
 //! design of each function that the action requires. The action also gets conditions: the design solves the
 //! function, is available, and meets the quality bounds of the action (`t:requiresQuality`). A quality bound with a
 //! context, which is a predicate of the domain, applies only while this predicate holds for the action's
-//! parameters, including the moment at which the action starts.
+//! parameters, including the moment at which the action starts. Availability and bounds are conditions over all of a
+//! durative action. These do not apply to the duration 0, so if it is possible, they are conditions at the start, too.
 //!
 //! A numeric function without parameters that is named like an estimated attribute is replaced by the sum over the
 //! chosen designs, unless the attribute is measured or the function has an initial value. A function that is bound to
@@ -27,6 +28,7 @@ use std::fmt::Write as _;
 use num_rational::BigRational;
 use num_traits::Zero as _;
 use ontology::tomasys::{FunctionDesign, Individual, Quality, View};
+use pddl::Signs;
 use pddl::ast::{
     Action, ActionBody, Arithmetic, Assignment, Condition, ConditionTime, Declaration, Domain, Effect,
     EffectTime, Expression, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
@@ -270,6 +272,39 @@ impl CoAdaptation {
         explicit
     }
 
+    /// Returns the explicit form `domain` with the conditions over all on designs also at the start of each action whose
+    /// duration may be 0. Returns `None` if there is no such action.
+    pub(super) fn with_starts(&self, domain: &Domain, problem: &Problem) -> Option<Domain> {
+        let signs = Signs::new(domain, problem);
+        let admits_zero = |action: &Action| {
+            self.actions.contains_key(&action.identifier.name) && signs.admit_zero(&action.body)
+        };
+        if !domain.actions.iter().any(admits_zero) {
+            return None;
+        }
+        let mut extended = domain.clone();
+        for action in extended.actions.iter_mut().filter(|action| admits_zero(action)) {
+            let ActionBody::Durative { conditions, effects, .. } = &mut action.body else { continue };
+            let lasting = conditions.iter().filter(|(time, condition)| {
+                *time == ConditionTime::OverAll
+                    && self.is_about_designs(condition)
+                    && !is_ended_context(condition, effects, domain)
+            });
+            let starts: Vec<_> = lasting.map(|(_, part)| (ConditionTime::AtStart, part.clone())).collect();
+            conditions.extend(starts);
+        }
+        Some(extended)
+    }
+
+    /// Returns `true` if a condition has an atom of a predicate that only the explicit form has.
+    fn is_about_designs(&self, condition: &Condition) -> bool {
+        let mut is_about_designs = false;
+        condition.walk(&mut |node| {
+            is_about_designs |= node.atom().is_some_and(|atom| self.is_added(&atom.predicate.name));
+        });
+        is_about_designs
+    }
+
     /// For each quality bound, adds facts to the problem for the designs that meet it. A design that lacks an
     /// estimate still meets the bound if no design of the required functions that it solves has an estimate of the
     /// attribute. Adds the values for changes of designs that the bindings do not add.
@@ -504,7 +539,8 @@ impl CoAdaptation {
 }
 
 /// Returns two lists of conditions on the designs of an action: those that must hold when the
-/// action starts, and those that must hold during the action.
+/// action starts, and those that must hold during the action. A quality bound does not apply to a function if no design
+/// of the function has an estimate of the attribute.
 fn conditions(
     designs: &[(Identifier, &Needed)],
     needs: &Needs,
@@ -514,7 +550,8 @@ fn conditions(
     for (design, needed) in designs {
         chosen.push(Condition::Atom(of_design(SOLVES, design, Some(&needed.name))));
         lasting.push(Condition::Atom(of_design(AVAILABLE, design, None)));
-        for quality in &needs.quality {
+        let applies = |quality: &&Quality| needed.attributes.contains(&quality.bounds.attribute);
+        for quality in needs.quality.iter().filter(applies) {
             let kept = Condition::Atom(of_design(meets(quality).as_str(), design, None));
             let context = quality.context.as_ref().and_then(|context| {
                 domain.predicates.iter().find(|p| p.identifier.name == Name::new(context))

@@ -17,8 +17,8 @@ pub(super) struct Moment {
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct Record {
-    /// States of the trajectory, in order. Only the last one if no constraint concerns another one; none if
-    /// the domain and the problem have no constraints.
+    /// States of the trajectory, in order; only the last state if all constraints concern the last state. Empty
+    /// if the domain and the problem have no constraints.
     pub(super) moments: Vec<Moment>,
     keeps_all: bool,
     /// Violated preferences of actions, once per violation.

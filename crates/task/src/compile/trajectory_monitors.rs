@@ -208,7 +208,7 @@ impl<'t> Monitors<'t> {
                     )
                 })?;
                 let mut ways = ways(touched);
-                // Each way has its own copy of the conditions, so many ways are not distinguished.
+                // Each way has its own copy of the conditions, which would take quadratic space.
                 if ways.len() > MAX_WAYS {
                     ways = vec![any(ways)];
                 }

@@ -109,7 +109,7 @@ pub struct Schema {
     pub end_effects: Vec<Effect>,
     /// Duration in the domain's time unit; `None` for an instantaneous action.
     pub duration: Option<Expression>,
-    /// Which admissible duration `duration` is, if several are admissible.
+    /// Choice among the admissible durations.
     pub choice: DurationChoice,
     /// Set if start and end are simultaneous, because the duration is 0. `end_effects` then contains both
     /// sets of effects.
