@@ -124,11 +124,11 @@ fn merge_types(hierarchy: &TypeHierarchy, objects: &mut Vec<TypedName>) {
             |alternative: &Identifier| alternatives.iter().all(|present| present.name != alternative.name);
         let new_alternatives: Vec<_> = object.r#type.alternatives.into_iter().filter(is_new).collect();
         alternatives.extend(new_alternatives);
-        let all = alternatives.clone();
+        let candidates = alternatives.clone();
         let is_below = |lower: &Identifier, upper: &Identifier| {
             hierarchy.is_a(&lower.name, &upper.name) && !hierarchy.is_a(&upper.name, &lower.name)
         };
-        alternatives.retain(|upper| !all.iter().any(|lower| is_below(lower, upper)));
+        alternatives.retain(|upper| !candidates.iter().any(|lower| is_below(lower, upper)));
     }
     *objects = merged;
 }

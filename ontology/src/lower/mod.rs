@@ -203,14 +203,14 @@ impl Context<'_> {
             });
             rejected.insert((self.swrl_rule(index), identity));
         }
-        let kept: Vec<bool> = self
+        let usable: Vec<bool> = self
             .rules
             .iter()
             .enumerate()
             .map(|(index, rule)| !rejected.contains(&(self.swrl_rule(index), rule.identity.clone())))
             .collect();
-        let mut kept = kept.into_iter();
-        self.rules.retain(|_| kept.next().unwrap_or(true));
+        let mut usable = usable.into_iter();
+        self.rules.retain(|_| usable.next().unwrap_or(true));
     }
 
     /// Returns the number of SWRL rules up to the one from which the rule `index` was lowered.
