@@ -237,6 +237,6 @@ fn checked(report: &Verification, is_interrupted: bool) -> Checked {
 
 /// Result of a verification that a limit has ended.
 fn unchecked() -> Checked {
-    let verdict = "not checked: a limit on time or memory was reached".to_owned();
+    let verdict = "not checked: interrupted, or a limit on time or memory was reached".to_owned();
     Checked { verified: false, stopped: true, verdict, parts: Vec::new() }
 }

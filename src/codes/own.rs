@@ -138,7 +138,7 @@ pub const CODES: &[[&str; 4]] = &[
         "M133",
         "The directory or file exists already.",
         "`init` and `import` never overwrite files, and `export` does not overwrite the files of the mission.",
-        "Choose another name.",
+        "Choose another name, or delete the files first.",
     ],
     [
         "M134",

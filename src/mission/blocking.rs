@@ -2,8 +2,9 @@
 //!
 //! The explanation is sought if the mission has no plan, but would have one with all designs of the
 //! knowledge base available. Designs are made available one by one, and a design stays available if there is still
-//! no plan. The remaining set of unavailable designs is minimal: with any one of them available,
-//! there would be a plan. This is the deletion-based search for a minimal unsatisfiable core [1],
+//! no plan. The remaining set of designs is minimal: with any one of them available,
+//! there would be a plan. In PLANTA's form, actions can make a design unavailable, so all designs are tried if those that are
+//! unavailable at the start are not sufficient. This is the deletion-based search for a minimal unsatisfiable core [1],
 //! with the planner in place of the SAT solver; its proofs hold for plans of every length.
 //!
 //! [1] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
@@ -56,10 +57,21 @@ pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option
     if designs.is_empty() {
         return None;
     }
-    let names = designs.into_iter().map(|design| design.individual.name);
-    let missing: Vec<String> = names.filter(|name| !mission.is_available(problem, name)).collect();
+    let names: Vec<String> = designs.into_iter().map(|design| design.individual.name).collect();
+    let mut missing = Vec::new();
+    for name in &names {
+        config.limits.check().ok()?;
+        if !mission.is_available(problem, name) {
+            missing.push(name.clone());
+        }
+    }
+    let mut is_solvable = solvable_with(mission, problem, &missing, config)?;
+    if !is_solvable && mission.completed_predicates().is_some() && missing.len() < names.len() {
+        missing = names;
+        is_solvable = solvable_with(mission, problem, &missing, config)?;
+    }
     let mut blocking = missing.clone();
-    if solvable_with(mission, problem, &missing, config)? {
+    if is_solvable {
         for design in &missing {
             let remaining: Vec<String> = blocking.iter().filter(|name| *name != design).cloned().collect();
             let available: Vec<String> =

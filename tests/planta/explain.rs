@@ -63,12 +63,16 @@ fn explained(input: &Input, design: &str) -> (Value, Value) {
     (json!([answer["available"], costs]), answer)
 }
 
+/// Actions of which the first breaks the design that the second needs.
+fn loading_breaks() -> String {
+    let load = "(:action load :parameters () :precondition () :effect (and (loaded) (Broken d)))\n";
+    USE.replace("(FunctionDesign ?fd)", "(FunctionDesign ?fd) (loaded)") + load
+}
+
 #[test]
 fn facts_and_effects_determine_realisability() {
-    let breaks = "(:action load :parameters () :precondition () :effect (and (loaded) (Broken d)))\n";
-    let late = USE.replace("(FunctionDesign ?fd)", "(FunctionDesign ?fd) (loaded)");
     let odd = "Declaration(Class(:Odd)) EquivalentClasses(:Odd :Broken) ClassAssertion(:Odd :d)";
-    let (repaired, broken) = (format!("{USE}{REPAIR}"), format!("{late}{breaks}"));
+    let (repaired, broken) = (format!("{USE}{REPAIR}"), loading_breaks());
     for (axioms, actions, init, expected) in [
         ("", &repaired, "", json!([true, [1, 1, null]])),
         ("", &repaired, "(Broken d)", json!([false, [2, 1, null]])),
@@ -88,8 +92,10 @@ fn facts_and_effects_determine_realisability() {
 
 #[test]
 fn designs_that_the_problem_makes_unrealisable_are_reasons() {
-    for (axioms, init) in [("", "(Broken d)"), ("ClassAssertion(:Broken :d)", "")] {
-        let (_directory, input) = mission(axioms, USE, init);
+    let broken = loading_breaks();
+    let cases = [("", USE, "(Broken d)"), ("ClassAssertion(:Broken :d)", USE, ""), ("", &broken, "")];
+    for (axioms, actions, init) in cases {
+        let (_directory, input) = mission(axioms, actions, init);
         let answer = answer(&input, "plan", &[], 10);
         assert_eq!(answer["blocking"], json!(["d"]), "{axioms} {init}: {answer:#}");
     }

@@ -246,7 +246,7 @@ fn certificates_are_not_rejected_at_the_time_limit() {
         ["report", "domain.pddl", "problem.pddl", "--time-limit", "3", "--certificate", "certificate"];
     let outcome = metaplan_in(folder.path(), &arguments, "");
     assert_eq!(outcome.status, 1, "{}", outcome.stderr);
-    let verdict = "not checked: a limit on time or memory was reached";
+    let verdict = "not checked: interrupted, or a limit on time or memory was reached";
     assert!(outcome.stdout.contains(verdict) && outcome.stderr.contains(verdict), "{}", outcome.stderr);
     assert!(!outcome.stdout.contains(">failed<") && !outcome.stdout.contains("NOT verified"));
 }

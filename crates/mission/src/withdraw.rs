@@ -1,6 +1,7 @@
 //! Removes facts of a predicate from a task: from the initial state, and from the conclusions of the axioms.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 
 use pddl::ast::{Condition, Derived, Domain, InitialElement, Name, Problem, Span, Term, TypedName};
 
@@ -20,13 +21,18 @@ pub(crate) fn withdraw(
         _ => false,
     };
     problem.init.retain(|element| !is_withdrawn(element));
+    // The knowledge base may have names that are no objects of the problem.
+    let objects: HashSet<&Name> =
+        domain.constants.iter().chain(&problem.objects).map(|object| &object.identifier.name).collect();
+    let [first, second] = [first, second]
+        .map(|names| names.iter().filter(|name| objects.contains(name)).cloned().collect::<Vec<_>>());
     let concludes = |axiom: &Derived| axiom.head.identifier.name == *predicate;
     if first.is_empty() || second.is_empty() || !domain.derived.iter().any(concludes) {
         return;
     }
     for axiom in domain.to_mut().derived.iter_mut().filter(|axiom| concludes(axiom)) {
         let [subject, object] = &axiom.head.parameters[..] else { continue };
-        let remains = Condition::Or(vec![differs(subject, first), differs(object, second)]);
+        let remains = Condition::Or(vec![differs(subject, &first), differs(object, &second)]);
         let condition = std::mem::replace(&mut axiom.condition, Condition::And(Vec::new()));
         axiom.condition = Condition::And(vec![condition, remains]);
     }

@@ -211,7 +211,14 @@ fn a_longest_duration_is_refused_if_zero_is_admissible() {
         let errors = ground(&domain, &problem, &GroundConfig::default()).expect_err("a refusal");
         assert!(errors.iter().all(|error| error.to_string().contains("may be 0")), "{errors:?}");
     }
-    for bounds in ["(and (> ?duration 0) (<= ?duration 5))", "(and (>= ?duration 1) (<= ?duration 5))"] {
+    let accepted = [
+        "(and (> ?duration 0) (<= ?duration 5))",
+        "(and (>= ?duration 1) (<= ?duration 5))",
+        // No other duration is admissible.
+        "(<= ?duration 0)",
+        "(<= ?duration -1)",
+    ];
+    for bounds in accepted {
         let (domain, problem, _) = read_both(bounds);
         assert!(ground(&domain, &problem, &GroundConfig::default()).is_ok(), "{bounds}");
     }

@@ -78,6 +78,13 @@ impl Limits {
         Self { deadline, time: self.time, ..Self::default() }
     }
 
+    /// Returns limits for an optional part of completing an answer: half of the time of [`Self::extended`], and the
+    /// interrupt flags of these limits.
+    #[must_use]
+    pub fn extended_until_interrupted(&self) -> Self {
+        Self { interrupt: self.interrupt(), outer: self.outer.clone(), ..self.extended().half() }
+    }
+
     /// Sets the memory limit of a search in bytes. Searches compare it with their own estimate.
     #[must_use]
     pub fn with_room(mut self, bytes: usize) -> Self {

@@ -14,8 +14,9 @@ use crate::certificate::trim;
 const SPENT_CONFLICT_LIMIT: u64 = 500;
 /// Maximum number of conflicts for the formula with the fewest steps.
 const CONFLICT_LIMIT: u64 = 2_000;
-/// Maximum number of literals of a formula that is written; the checker reads larger ones. The largest formula that is
-/// refuted within the conflict limits for a reference instance has 21,862 clauses.
+/// Maximum number of literals of a formula that is written; the checkers read formulas of up to
+/// [`certificate::LITERAL_LIMIT`] literals. The largest formula that is refuted within the conflict limits for a reference
+/// instance has 21,862 clauses.
 const WRITTEN_LITERALS: usize = 400_000;
 /// Number of bits up to which the full conflict limit applies. For wider numbers, the limit is inversely
 /// proportional to the width, because each conflict costs more.

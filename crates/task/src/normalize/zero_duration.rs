@@ -16,8 +16,8 @@ type Range = Option<(Rational, Rational)>;
 /// whose duration is always 0 is converted instead.
 ///
 /// # Errors
-/// Returns an error for each schema with a variable duration if 0 may be admissible. Such a schema is refused because the
-/// conditions for duration 0 differ from those for longer durations.
+/// Returns an error for each schema with a variable duration if 0 and longer durations may be admissible, and the
+/// conditions or effects for duration 0 differ from those for longer durations.
 pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     let mut ranges: FxHashMap<FunctionId, (Rational, Rational)> = FxHashMap::default();
     for (function, _, value) in &lifted.values {
@@ -40,7 +40,12 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
         let admits_zero = match &schema.choice {
             DurationChoice::None => false,
             DurationChoice::Shortest => !is_above_zero(&(Comparison::GreaterOrEqual, duration.clone())),
-            DurationChoice::Longest(lower) => !lower.iter().any(is_above_zero),
+            DurationChoice::Longest(lower) => {
+                let may_be_positive = |(_, high): (Rational, Rational)| high.is_positive();
+                differs_at_zero(schema)
+                    && !lower.iter().any(is_above_zero)
+                    && range(&duration, &range_of_function).is_none_or(may_be_positive)
+            }
         };
         match range(&duration, &range_of_function) {
             _ if admits_zero => errors.push(Error::Unsupported {
@@ -72,6 +77,13 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     }
     lifted.schemas.extend(instants);
     if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
+}
+
+/// Returns `true` if the conditions or effects for duration 0 may differ from those for longer durations.
+fn differs_at_zero(schema: &Schema) -> bool {
+    let is_empty = |formula: &Formula| matches!(formula, Formula::And(parts) if parts.is_empty());
+    let has_end = !schema.end_effects.is_empty() || !is_empty(&schema.at_end);
+    !is_empty(&schema.over_all) || !schema.start_effects.is_empty() && has_end
 }
 
 fn instant(schema: &Schema) -> Schema {

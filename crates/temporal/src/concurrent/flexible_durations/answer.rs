@@ -50,8 +50,8 @@ pub(super) fn answer(
     let rounded = if is_decimal {
         None
     } else {
-        let limits = if search_limits.has_deadline() { limits } else { search_limits };
-        rounded(concurrent, &program, (&value, &durations), limits).unwrap_or(None)
+        let limits = search_limits.extended_until_interrupted();
+        rounded(concurrent, &program, (&value, &durations), &limits).unwrap_or(None)
     };
     let times: Vec<Affine> = course.passed.iter().map(|passed| passed.time.clone()).collect();
     let program = best(&rounded.unwrap_or(fixed), &[&Affine::column(MAKESPAN), &sum(&times)], limits)?;
