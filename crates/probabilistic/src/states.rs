@@ -235,33 +235,3 @@ impl<'a, S: Eq + Hash> IntoIterator for &'a States<S> {
         self.iter()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Returns the resident memory of this process in pages, if the system reports it.
-    fn resident() -> Option<u64> {
-        let statistics = std::fs::read_to_string("/proc/self/statm").ok()?;
-        statistics.split_whitespace().nth(1)?.parse().ok()
-    }
-
-    #[test]
-    fn copies_of_sparse_tables_use_little_memory() {
-        let mut states = States::new(Some(1 << 26));
-        for state in [7_usize, 1 << 20, (1 << 26) - 1] {
-            let probe = states.probe(&state, |state| *state);
-            states.insert(state, probe);
-        }
-        let before = resident();
-        let copy = states.clone();
-        if let (Some(before), Some(after)) = (before, resident()) {
-            // The table has 65,536 pages of 4 kB.
-            assert!(after.saturating_sub(before) < 30_000, "from {before} to {after} pages");
-        }
-        for (number, state) in copy.iter().enumerate() {
-            assert_eq!(copy.number(*state, state), Some(number));
-        }
-        assert_eq!(copy.number(8, &8), None);
-    }
-}

@@ -1,9 +1,9 @@
 //! The cache of module behaviours does not change results: random models are explored with and
-//! without the cache, and yield the same process or the same error.
+//! without the cache, and yield the same process or the same error. Copies of tables of states use little memory.
 
 use std::fmt::Write as _;
 
-use metaplan_probabilistic::explore::{Bounds, Explored, explore};
+use metaplan_probabilistic::explore::{Bounds, Choices, Explored, Generator, explore};
 use metaplan_probabilistic::prism::{self, Packed, Program, Remembered, Settings};
 use metaplan_probabilistic::{BigRational, Error, Number};
 
@@ -121,4 +121,56 @@ rewards [x] x>0 : x; [] true : x; endrewards";
     let program = Program::<f64>::new(&model, &Settings::new()).expect("names are right").with_rewards(&[0]);
     let plain = shown(explore(&program, &Bounds::default()));
     assert!(plain == shown(explore(&Remembered::new(&program), &Bounds::default())), "they differ");
+}
+
+/// A chain whose state codes are far apart.
+struct Sparse;
+
+const STATES: usize = 64;
+
+impl Generator<f64> for Sparse {
+    type State = usize;
+
+    fn initial(&self) -> usize {
+        0
+    }
+
+    fn rewards(&self) -> usize {
+        0
+    }
+
+    fn codes(&self) -> Option<usize> {
+        Some(STATES << 20)
+    }
+
+    fn code(&self, state: &usize) -> usize {
+        state << 20
+    }
+
+    fn successors(&self, state: &usize, choices: &mut Choices<usize, f64>) -> Result<(), Error> {
+        choices.to((state + 1) % STATES, 1.0);
+        choices.end(0, []);
+        Ok(())
+    }
+}
+
+/// Returns the resident memory of this process in pages, if the system reports it.
+fn resident() -> Option<u64> {
+    let statistics = std::fs::read_to_string("/proc/self/statm").ok()?;
+    statistics.split_whitespace().nth(1)?.parse().ok()
+}
+
+#[test]
+fn copies_of_sparse_tables_of_states_use_little_memory() {
+    let states = explore(&Sparse, &Bounds::default()).expect("a chain").states;
+    let before = resident();
+    let copy = states.clone();
+    if let (Some(before), Some(after)) = (before, resident()) {
+        // The table has 65,536 pages of 4 kB. Other tests may run at the same time.
+        assert!(after.saturating_sub(before) < 50_000, "from {before} to {after} pages");
+    }
+    for (number, state) in copy.iter().enumerate() {
+        assert_eq!(copy.number(Sparse.code(state), state), Some(number));
+    }
+    assert_eq!((copy.len(), copy.number(1, &0)), (STATES, None));
 }

@@ -145,7 +145,8 @@ fn recursive_formulas_are_rejected() {
 /// The search for recursive formulas follows each reference once.
 #[test]
 fn a_long_chain_of_formulas_is_refused_at_once() {
-    let links = (1..20_000).map(|link| format!("formula f{link} = f{} + s;", link - 1)).collect::<String>();
+    let links = (1..20_000).map(|link| format!("formula f{link} = f{} + s;", link - 1));
+    let links = links.collect::<Vec<_>>().concat();
     let text =
         format!("mdp formula f0 = s; {links} module m s:[0..1] init 0; [] f19999 = 0 -> (s'=1); endmodule");
     let problems = jani::write("m", &prism::parse(&text).expect("a model")).expect_err("refused");
