@@ -274,6 +274,10 @@ fn check(seeds: std::ops::Range<u64>, equalities: bool) {
         if equalities {
             stated.extend((0..2).map(|_| random.equality()));
         }
+        let retracts_part = seed % 8 == 2;
+        if retracts_part {
+            stated.push("DifferentIndividuals(:a :c :e)".to_owned());
+        }
         stated.sort();
         stated.dedup();
         let mut revised = Revised::new(&document(&stated, true));
@@ -292,8 +296,10 @@ fn check(seeds: std::ops::Range<u64>, equalities: bool) {
             if random.below(4) == 0 {
                 old.push(random.statement());
             }
-            if (seed + step) % 8 == 2 {
-                // A part of a group, which is not stated.
+            if retracts_part && step == 0 {
+                // A pair of the group, which is not stated. Few other changes, so that a translation may be skipped.
+                new.truncate(1);
+                old.truncate(1);
                 old.push("DifferentIndividuals(:a :e)".to_owned());
             }
             // Another spelling of a stated fact is not retracted: the change would remove the fact, but the

@@ -203,14 +203,12 @@ impl Context<'_> {
             });
             rejected.insert((self.swrl_rule(index), identity));
         }
-        let usable: Vec<bool> = self
-            .rules
-            .iter()
-            .enumerate()
-            .map(|(index, rule)| !rejected.contains(&(self.swrl_rule(index), rule.identity.clone())))
-            .collect();
-        let mut usable = usable.into_iter();
-        self.rules.retain(|_| usable.next().unwrap_or(true));
+        let is_rejected = |(index, rule): (usize, &Rule)| {
+            rejected.contains(&(self.swrl_rule(index), rule.identity.clone()))
+        };
+        let flags: Vec<bool> = self.rules.iter().enumerate().map(is_rejected).collect();
+        let mut flags = flags.into_iter();
+        self.rules.retain(|_| flags.next() != Some(true));
     }
 
     /// Returns the number of SWRL rules up to the one from which the rule `index` was lowered.

@@ -525,11 +525,10 @@ impl<'e> Update<'e> {
             let mut pairs = Vec::new();
             for blocks in classes.values() {
                 for (index, block) in blocks.iter().enumerate() {
-                    let following = || blocks[index + 1..].iter().copied().flatten();
                     for &left in *block {
-                        for &right in following() {
-                            let symmetric = [[left, right], [right, left]];
-                            pairs.extend(symmetric.map(|pair| Fact::new(self.equality.same_as, pair)));
+                        for &right in blocks[index + 1..].iter().copied().flatten() {
+                            let directions = [[left, right], [right, left]];
+                            pairs.extend(directions.map(|pair| Fact::new(self.equality.same_as, pair)));
                         }
                     }
                 }

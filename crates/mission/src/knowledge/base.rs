@@ -506,13 +506,6 @@ impl Knowledge {
         self.engine().inferred_in_brief(MANY_NAMES)
     }
 
-    /// Returns all facts that hold, in the order of symbols. Equal names are treated as in [`Knowledge::inferred`].
-    pub fn facts_in_brief(&self) -> Vec<Fact> {
-        let mut facts = self.engine().facts_in_brief(MANY_NAMES);
-        facts.sort_unstable();
-        facts
-    }
-
     /// Returns all contradictions; empty if the knowledge is consistent.
     pub fn contradictions(&self) -> Vec<Contradiction> {
         let symbols = self.engine().symbols();
