@@ -338,7 +338,7 @@ impl BeliefUpdate<'_> {
             if let (Some(now), Some(before)) = (self.beliefs.mission.value(name), &change.before) {
                 // The value is exact, so that the end of the action has the effects that were planned.
                 let value = number::bounded(&now + (&change.after - before) * &increment);
-                self.beliefs.mission.set_number(name, value.clone());
+                self.beliefs.mission.set_number(name, &value);
                 if let Some(running) = &mut self.beliefs.running {
                     *running.applied.entry(name.to_owned()).or_default() += value - now;
                 }

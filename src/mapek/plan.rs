@@ -22,6 +22,7 @@ use crate::number;
 const MAX_DOUBLINGS: u32 = 3;
 
 #[derive(Debug, Clone, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(crate) struct Planner {
     pub time_limit: Option<Duration>,
     /// Number of earlier searches in the current series of scheduled repetitions. Each doubles the time limit, up to

@@ -117,20 +117,20 @@ impl Mission {
                 format!("the value `{value}` of {function} is not a decimal number"),
             ));
         };
-        Ok(self.assign(function, arguments, number))
+        Ok(self.assign(function, arguments, &number))
     }
 
     /// Sets the value of a numeric function of the problem, given as `name arguments`, to an exact number.
-    pub fn set_number(&mut self, name: &str, number: BigRational) {
+    pub fn set_number(&mut self, name: &str, number: &BigRational) {
         let words: Vec<Name> = name.split_whitespace().map(Name::new).collect();
         if let Some((function, arguments)) = words.split_first() {
             self.assign(function, arguments, number);
         }
     }
 
-    fn assign(&mut self, function: &Name, arguments: &[Name], number: BigRational) -> bool {
+    fn assign(&mut self, function: &Name, arguments: &[Name], number: &BigRational) -> bool {
         let is_target = |element: &InitialElement| matches!(element, InitialElement::Value(a, _, _) if same_atom(a, function, arguments));
-        let is_equal = |element: &InitialElement| matches!(element, InitialElement::Value(_, value, _) if *value == number);
+        let is_equal = |element: &InitialElement| matches!(element, InitialElement::Value(_, value, _) if value == number);
         if self.has_only(is_target, is_equal) {
             return false;
         }
