@@ -227,7 +227,7 @@ mod tests {
         assert!(!old.is_old(published(Duration::ZERO)));
         assert!(!old.is_old(Some(old.since + hour)));
         assert!(!old.is_old(None));
-        let expected = Old { is_wanted: true, ..old };
-        assert!(!expected.is_old(Some(expected.since - Duration::from_secs(1))));
+        let latched = Old { is_wanted: true, ..old };
+        assert!(!latched.is_old(Some(latched.since - Duration::from_secs(1))));
     }
 }
