@@ -48,7 +48,7 @@ enum Command {
         #[command(flatten)]
         work: Work,
         /// Set the name of the worker, which must be unique. [default: host name and process id]
-        #[arg(long, value_name = "NAME", value_parser = worker_name)]
+        #[arg(long, value_name = "NAME", value_parser = name)]
         name: Option<String>,
     },
     /// Run a whole fleet in one process: events from standard input, decisions to standard output.
@@ -82,7 +82,7 @@ enum Command {
         #[command(flatten)]
         server: Server,
         /// Print only the decisions for this robot.
-        #[arg(value_name = "ROBOT")]
+        #[arg(value_name = "ROBOT", value_parser = name)]
         robot: Option<String>,
         /// Begin after the decision with this number; 0 begins with the first decision. [default: only new decisions]
         #[arg(long, value_name = "DECISION")]
@@ -241,8 +241,8 @@ async fn run(command: Command) -> Result<(), Errors> {
     Ok(())
 }
 
-/// Parses the name of a worker, under which the server stores its status.
-fn worker_name(text: &str) -> Result<String, String> {
+/// Parses the name of a robot, or of a worker, under which the server stores its status.
+fn name(text: &str) -> Result<String, String> {
     let name = is_name(text).then(|| text.to_owned());
     name.ok_or_else(|| "a name has up to 64 letters, digits, `-` and `_`".to_owned())
 }
@@ -274,11 +274,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_workers_can_be_keys() {
-        let parse = |name| {
-            let words = ["metaplan-fleet", "worker", "--nats", "nats://h", "--missions", "m", "--name", name];
-            Arguments::try_parse_from(words).is_ok()
-        };
-        assert!(parse("a-b_1") && !parse("a b"));
+    fn names_of_workers_and_robots_can_be_keys() {
+        let parse = |words: &[&str]| Arguments::try_parse_from(words).is_ok();
+        let worker = ["metaplan-fleet", "worker", "--nats", "nats://h", "--missions", "m", "--name"];
+        let follow = ["metaplan-fleet", "follow", "--nats", "nats://h"];
+        for command in [&worker[..], &follow] {
+            assert!(parse(&[command, &["a-b_1"]].concat()) && !parse(&[command, &["a b"]].concat()));
+        }
     }
 }

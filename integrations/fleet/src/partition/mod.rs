@@ -19,7 +19,7 @@ mod threads;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
@@ -155,14 +155,45 @@ pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, drain: watc
     }
 }
 
+/// Repeats an operation until it succeeds. After a permanent failure of the log, waits until the task is aborted.
 pub(crate) async fn persist<T, F: Future<Output = Result<T, Fault>>>(operation: impl Fn() -> F) -> T {
+    match repeat(operation).await {
+        Ok(value) => value,
+        Err(_) => std::future::pending().await,
+    }
+}
+
+/// Repeats an operation with growing pauses while the log is unreachable.
+///
+/// # Errors
+/// As for the operation, except [`Fault::Unreachable`].
+pub async fn repeat<T, F: Future<Output = Result<T, Fault>>>(operation: impl Fn() -> F) -> Result<T, Fault> {
     let mut attempt = 1;
     loop {
         match operation().await {
-            Ok(value) => return value,
-            Err(_) => pause(attempt).await,
+            Err(Fault::Unreachable(why)) => {
+                warn(attempt, &why);
+                pause(attempt).await;
+            }
+            outcome => return outcome,
         }
         attempt += 1;
+    }
+}
+
+/// Number of failed attempts without a warning.
+const SILENT_ATTEMPTS: u32 = 4;
+
+/// Minimum time between two warnings of the process.
+const WARNING_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Logs why an operation is repeated. The operations of all robots fail together, so most warnings are suppressed.
+pub(crate) fn warn(attempt: u32, why: &str) {
+    static LAST: Mutex<Option<Instant>> = Mutex::new(None);
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    if attempt > SILENT_ATTEMPTS && last.is_none_or(|last| last.elapsed() >= WARNING_INTERVAL) {
+        *last = Some(Instant::now());
+        tracing::warn!("the log does not respond, and the request is repeated: {why}");
     }
 }
 

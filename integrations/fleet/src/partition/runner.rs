@@ -10,7 +10,7 @@ use tokio::sync::watch;
 use tokio::task::JoinSet;
 
 use super::own::Inbox;
-use super::{Shared, pause, persist};
+use super::{Shared, pause, persist, warn};
 use crate::missions::Missions;
 use crate::robot::{Begun, Refused, Robot, Undecided, is_retirement};
 use crate::store::{Fault, Message, Store, Stored, Stream};
@@ -376,7 +376,7 @@ impl<S: Store> Runner<S> {
                     metrics::counter!("metaplan_fleet_fenced_total").increment(1);
                     break Outcome::Outdated;
                 }
-                Err(Fault::Unreachable(_)) => {}
+                Err(Fault::Unreachable(why) | Fault::Failed(why)) => warn(attempt, &why),
             }
             metrics::counter!("metaplan_fleet_retries_total").increment(1);
             pause(attempt).await;
