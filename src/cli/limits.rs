@@ -2,7 +2,7 @@
 //!
 //! While a mission is read and reasoned about, there is no answer to save. So a signal ends the
 //! program at once, and a separate thread ends it at a limit, unless an answer is being written.
-//! Commands that do not plan need nothing else. In commands that plan, the planner handles the
+//! Commands that do not plan need nothing else, except as process 1. In commands that plan, the planner handles the
 //! first signal after the mission has been read, and returns the best plan found. A second signal
 //! ends the program at once.
 //!
@@ -23,6 +23,21 @@ use verify::memory;
 use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::output;
 use crate::cli::values::seconds;
+
+/// Lets signals end the program if it is process 1, as in a container. Linux does not deliver signals to this process that
+/// it does not handle. Commands with partial results replace these handlers.
+#[cfg(unix)]
+pub(super) fn handle_signals_of_process_1() {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+    if std::process::id() == 1 {
+        let is_ended = Arc::new(AtomicBool::new(true));
+        for signal in [SIGHUP, SIGINT, SIGTERM] {
+            // Without a handler, the program can still be killed.
+            let _ = signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&is_ended));
+        }
+    }
+}
 
 const INTERVAL: Duration = Duration::from_millis(10);
 

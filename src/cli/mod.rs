@@ -134,6 +134,8 @@ const MAX_HELP_COLUMNS: usize = 100;
 
 /// Parses the command line, runs the command, and reports failures and panics.
 pub fn main() -> ExitCode {
+    #[cfg(unix)]
+    limits::handle_signals_of_process_1();
     let cli = parse();
     // The default hook would print a message for developers; a short message for users is printed below.
     std::panic::set_hook(Box::new(|_| {}));

@@ -34,8 +34,8 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "N312",
         "The log of a fleet cannot be read or written.",
-        "The servers are unreachable or have no space.",
-        "Acknowledged events are safe. Start the command again when the servers are available.",
+        "The servers are unreachable or have no space, or the disk of a fleet in a directory is full.",
+        "Acknowledged events are safe. Start the command again when the servers are available, or when there is space.",
     ],
     [
         "N313",

@@ -100,7 +100,7 @@ pub struct Loop {
     agenda: Option<Agenda>,
     /// Number of reactions that may have changed the planning problem, which identifies the current problem.
     pub(super) question: u64,
-    digest: String,
+    pub(super) digest: String,
     /// Number of names and values that the knowledge base had in addition to those of its documents when it was last
     /// rebuilt; 0 before.
     rebuilt_growth: usize,

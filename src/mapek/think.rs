@@ -28,6 +28,8 @@ pub struct Thinker {
 #[derive(Debug)]
 pub struct Thoughts {
     question: u64,
+    /// Checksum of the mission and the settings of the loop that planned.
+    digest: String,
     answers: Vec<(StoredQuestion, Outcome)>,
     is_stopped: bool,
 }
@@ -44,7 +46,8 @@ impl Thinker {
         self.control.planner.question_log = Some(Vec::new());
         self.control.deliberate();
         let answers = self.control.planner.question_log.take().unwrap_or_default();
-        Thoughts { question: self.control.question, answers, is_stopped: self.limits.reached() }
+        let Loop { question, digest, .. } = self.control;
+        Thoughts { question, digest, answers, is_stopped: self.limits.reached() }
     }
 }
 
@@ -135,7 +138,13 @@ impl Loop {
     /// Returns `true` if `thoughts` are plans for the loop's current planning problem, and planning was not
     /// interrupted.
     pub fn is_answered_by(&self, thoughts: &Thoughts) -> bool {
-        !thoughts.is_stopped && thoughts.question == self.question
+        self.is_usable(thoughts) && thoughts.question == self.question
+    }
+
+    /// Returns `true` if planning was not interrupted and the loop that planned has the same mission and settings as this
+    /// loop. The loops of two versions of a mission number their planning problems independently.
+    fn is_usable(&self, thoughts: &Thoughts) -> bool {
+        !thoughts.is_stopped && thoughts.digest == self.digest
     }
 
     /// Returns `true` if an observation mentions an action or an effect whose number has not been used in a request
@@ -177,10 +186,10 @@ impl Loop {
     }
 
     /// Runs [`Loop::deliberate`] with the plans in `thoughts`. Returns `None` and leaves the loop unchanged if planning
-    /// was interrupted, or if a plan is missing or does not fit the situation. Unless `is_late` is `true`, this is also
-    /// the case if the planning problem has changed since.
+    /// was interrupted, if the loop that planned has another mission, or if a plan is missing or does not fit the
+    /// situation. Unless `is_late` is `true`, this is also the case if the planning problem has changed since.
     pub fn deliberate_with(&mut self, thoughts: Thoughts, is_late: bool) -> Option<Vec<Answer>> {
-        if thoughts.is_stopped || !self.is_answered_by(&thoughts) && !is_late {
+        if !self.is_usable(&thoughts) || !self.is_answered_by(&thoughts) && !is_late {
             return None;
         }
         // A checkpoint covers only changes before the first plan. Therefore, the whole loop is copied.

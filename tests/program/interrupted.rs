@@ -2,11 +2,13 @@
 //! results and report that results are missing.
 
 use std::fs;
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use test_resources::{Resource, missing};
 
 #[cfg(unix)]
 use crate::common::is_ignored;
@@ -133,5 +135,35 @@ fn interrupted_comparisons_show_finished_results() {
     let count = |answer: &Value| answer["comparisons"].as_array().map_or(0, Vec::len);
     for answer in check(&root(), &arguments, 12, count) {
         assert_eq!(answer["complete"], false);
+    }
+}
+
+/// Linux does not deliver signals to process 1 of a container that this process does not handle.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_signal_ends_a_command_without_partial_results_that_is_process_1() {
+    let unshare = || Command::new("unshare");
+    let status = unshare().args(["-rpf", "true"]).stderr(Stdio::null()).status();
+    if !status.is_ok_and(|status| status.success()) {
+        missing(Resource::Namespaces, "unshare cannot create a namespace of processes");
+        return;
+    }
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        let mut child = unshare()
+            .args(["-rpf", env!("CARGO_BIN_EXE_metaplan"), "run", "missions/ugv.toml"])
+            .current_dir(root())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("a pipe")).read_line(&mut line).expect("text");
+        assert!(line.contains("answer"), "{line}");
+        let path = format!("/proc/{0}/task/{0}/children", child.id());
+        let process = fs::read_to_string(path).expect("the child of `unshare`");
+        assert!(Command::new("kill").args([signal, process.trim()]).status().expect("kill").success());
+        // Without a handler, the program would end with status 0 at the end of its input.
+        drop(child.stdin.take());
+        assert_eq!(child.wait().expect("it ends").code(), Some(130), "{signal}");
     }
 }

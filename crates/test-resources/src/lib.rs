@@ -33,6 +33,8 @@ pub enum Resource {
     Java,
     /// The Python packages `mcap` and `mcap-ros2-support`.
     Mcap,
+    /// The right to create namespaces of processes.
+    Namespaces,
     /// The server of NATS.
     Nats,
     /// The Python package `owlready2`, which contains Pellet.
@@ -65,12 +67,13 @@ pub enum Resource {
 
 impl Resource {
     /// All resources, each with its name and with a way to get it.
-    pub const ALL: [(Self, &str, &str); 19] = [
+    pub const ALL: [(Self, &str, &str); 20] = [
         (Self::Bash, "bash", "install bash"),
         (Self::Browser, "browser", "install Chromium (Debian: apt-get install chromium)"),
         (Self::Data, "data", "set METAPLAN_DATA to a directory with the test data"),
         (Self::Java, "java", "install a JDK (Debian: apt-get install openjdk-17-jdk-headless)"),
         (Self::Mcap, "mcap", "run .ci/mcap-peers, which installs the packages and sets METAPLAN_PYTHON"),
+        (Self::Namespaces, "namespaces", "run the test on Linux where `unshare -rpf true` succeeds"),
         (Self::Nats, "nats", "install nats-server 2.11 or newer, and set NATS_SERVER if it is not in PATH"),
         (
             Self::Owlready2,

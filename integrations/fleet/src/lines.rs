@@ -11,10 +11,10 @@ use comfy_table::{CellAlignment, Table, TableStyle};
 use futures::StreamExt as _;
 use futures::stream::select_all;
 use metaplan::message::Message;
-use metaplan_fleet::partition::Shared;
+use metaplan_fleet::partition::{Shared, repeat};
 use metaplan_fleet::robots::{Sender, Status};
 use metaplan_fleet::store::local::Local;
-use metaplan_fleet::store::{Store, Stored, Stream};
+use metaplan_fleet::store::{Fault, Store, Stored, Stream};
 use metaplan_fleet::wire::{Address, Decided, Presence, is_name, partition_of};
 use metaplan_fleet::worker;
 use serde_json::{Map, Value};
@@ -74,7 +74,7 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
             senders.spawn(send_all(Sender::new(store.clone(), robot, session), events));
             queue
         });
-        // The receiving task ends only after this channel is closed.
+        // The receiving task ends only after this channel is closed, or if the log has failed.
         let _ = queue.send((number, event.to_owned())).await;
     }
     drop(robots);
@@ -101,6 +101,10 @@ async fn send_all<S: Store>(mut sender: Sender<S>, mut events: mpsc::Receiver<(u
     while let Some((number, event)) = events.recv().await {
         if let Err(fault) = sender.send(&event).await {
             lost += 1;
+            if matches!(fault, Fault::Failed(_)) {
+                // All further lines are lost for the same reason, which is reported once.
+                break;
+            }
             let robot = &sender.address().robot;
             say(&unstored(format_args!("line {number}, robot `{robot}`: {fault}")));
         } else {
@@ -136,7 +140,8 @@ fn line(message: &Stored) -> Option<(String, String)> {
     Some((address.robot, Value::Object(line).to_string()))
 }
 
-/// Writes decisions to standard output until it is closed or the log fails.
+/// Writes decisions to standard output until it is closed or the log fails. While the log is unreachable, the writer
+/// waits for it.
 pub(crate) struct Writer<S> {
     store: S,
     /// `None` for the decisions of all robots.
@@ -168,7 +173,8 @@ impl<S: Store> Writer<S> {
             let from = self.written.lock().unwrap_or_else(PoisonError::into_inner).clone();
             let mut streams = Vec::new();
             for (partition, after) in from {
-                let stream = self.store.follow(Stream::Decisions, partition, after).await.map_err(fault)?;
+                let stream = repeat(|| self.store.follow(Stream::Decisions, partition, after)).await;
+                let stream = stream.map_err(fault)?;
                 streams.push(stream.map(move |message| (partition, message)).boxed());
             }
             let mut decisions = select_all(streams);
@@ -194,8 +200,22 @@ impl<S: Store> Writer<S> {
 
 /// Runs a fleet in a directory: events from standard input, decisions to standard output. Ends when
 /// `stop` becomes true, or when the input has ended and either all events are decided (except those of
-/// suspended robots) or the output is closed. `after` is as in [`Writer::new`].
+/// suspended robots) or the output is closed. Fails when the directory cannot be written. `after` is as in
+/// [`Writer::new`].
 pub(crate) async fn up(
+    shared: Arc<Shared<Local>>,
+    after: Option<u64>,
+    stop: watch::Receiver<bool>,
+) -> Result<(), Message> {
+    let store = shared.store.clone();
+    tokio::select! {
+        biased;
+        reason = store.failure() => Err(fault(reason)),
+        outcome = run(shared, after, stop) => outcome,
+    }
+}
+
+async fn run(
     shared: Arc<Shared<Local>>,
     after: Option<u64>,
     mut stop: watch::Receiver<bool>,
@@ -304,9 +324,68 @@ fn status_text(status: &Status) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicU32;
+    use std::time::Instant;
+
+    use delegate::delegate;
+    use metaplan_fleet::store::{Message as Appended, Receipt, Subscription};
     use tokio::sync::broadcast;
 
     use super::*;
+
+    /// A log whose first subscription ends, and which is then unreachable for two attempts.
+    #[derive(Clone)]
+    struct Interrupted {
+        inner: Local,
+        subscriptions: Arc<AtomicU32>,
+    }
+
+    impl Store for Interrupted {
+        delegate! {
+            to self.inner {
+                fn partitions(&self) -> u32;
+                fn lease(&self) -> Duration;
+                async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault>;
+                async fn append(&self, stream: Stream, message: Appended<'_>) -> Result<Receipt, Fault>;
+                async fn discard(&self, subject: &str, last: u64) -> Result<(), Fault>;
+                async fn last(&self, stream: Stream, subject: &str) -> Result<Option<Stored>, Fault>;
+                async fn next(&self, subject: &str, start: u64) -> Result<Option<Stored>, Fault>;
+                async fn announce(&self, worker: &str, status: Option<&Presence>) -> Result<(), Fault>;
+                async fn workers(&self) -> Result<BTreeMap<String, Presence>, Fault>;
+                async fn notice(&self, subject: &str, text: &str);
+            }
+        }
+
+        async fn follow(&self, stream: Stream, partition: u32, after: u64) -> Result<Subscription, Fault> {
+            match self.subscriptions.fetch_add(1, Ordering::SeqCst) {
+                0 => Ok(futures::stream::empty().boxed()),
+                1 | 2 => Err(Fault::Unreachable("timed out".to_owned())),
+                _ => self.inner.follow(stream, partition, after).await,
+            }
+        }
+    }
+
+    #[tokio::test]
+    async fn decisions_are_written_after_an_outage() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let inner = Local::open(folder.path(), 1, 8, Duration::from_secs(1))
+            .unwrap_or_else(|message| panic!("{message}"));
+        let message = Appended { subject: "0.r", id: "", after: None, payload: b"no decision" };
+        let receipt = inner.append(Stream::Decisions, message).await.expect("it is our own directory");
+        let store = Interrupted { inner, subscriptions: Arc::default() };
+        let writer = Writer::new(store, None, Some(0)).await.unwrap_or_else(|message| panic!("{message}"));
+        let is_written = async {
+            let begun = Instant::now();
+            while writer.written.lock().unwrap_or_else(PoisonError::into_inner)[&0] < receipt.sequence {
+                assert!(begun.elapsed() < Duration::from_secs(600));
+                tokio::time::sleep(Duration::from_millis(5)).await;
+            }
+        };
+        tokio::select! {
+            outcome = writer.run() => panic!("it has ended: {outcome:?}"),
+            () = is_written => {}
+        }
+    }
 
     #[tokio::test]
     async fn warnings_continue_after_a_burst() {

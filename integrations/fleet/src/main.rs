@@ -6,6 +6,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
@@ -48,7 +49,7 @@ enum Command {
         #[command(flatten)]
         work: Work,
         /// Set the name of the worker, which must be unique. [default: host name and process id]
-        #[arg(long, value_name = "NAME", value_parser = worker_name)]
+        #[arg(long, value_name = "NAME", value_parser = name)]
         name: Option<String>,
     },
     /// Run a whole fleet in one process: events from standard input, decisions to standard output.
@@ -82,7 +83,7 @@ enum Command {
         #[command(flatten)]
         server: Server,
         /// Print only the decisions for this robot.
-        #[arg(value_name = "ROBOT")]
+        #[arg(value_name = "ROBOT", value_parser = name)]
         robot: Option<String>,
         /// Begin after the decision with this number; 0 begins with the first decision. [default: only new decisions]
         #[arg(long, value_name = "DECISION")]
@@ -179,6 +180,14 @@ fn main() -> ExitCode {
         .with_max_level(arguments.log)
         .with_target(false)
         .init();
+    let signals = Signals::default();
+    // A process 1, as in a container, is not ended by signals without a handler.
+    if std::process::id() == 1
+        && let Err(message) = signals.handle()
+    {
+        eprint!("{}", message.text());
+        return ExitCode::from(2);
+    }
     let runtime = match tokio::runtime::Runtime::new() {
         Ok(runtime) => runtime,
         Err(error) => {
@@ -186,7 +195,7 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    let outcome = runtime.block_on(Box::pin(run(arguments.command)));
+    let outcome = runtime.block_on(Box::pin(run(arguments.command, signals)));
     // A search that still runs has no effect any more.
     runtime.shutdown_background();
     match outcome {
@@ -204,7 +213,7 @@ fn has_colours() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
-async fn run(command: Command) -> Result<(), Errors> {
+async fn run(command: Command, signals: Signals) -> Result<(), Errors> {
     match command {
         Command::Worker { server, work, name } => {
             // The endpoints are opened first, so that probes can distinguish a worker that waits for its servers from
@@ -212,20 +221,20 @@ async fn run(command: Command) -> Result<(), Errors> {
             let health = work.open_endpoints()?;
             let store = server.open(60).await?;
             let shared = work.shared(store, name.unwrap_or_else(own_name), health)?;
-            worker::run(shared, signals()?).await;
+            worker::run(shared, signals.stop()?).await;
         }
         Command::Up { local, after, work, partitions, history } => {
             let store = Local::open(&local, partitions, history as usize, Duration::from_secs(10))?;
             let health = work.open_endpoints()?;
             let shared = work.shared(store, own_name(), health)?;
-            lines::up(shared, after, signals()?).await?;
+            lines::up(shared, after, signals.stop()?).await?;
         }
         Command::Send { server, session } => {
             lines::send(&server.open(10).await?, session).await?;
         }
         Command::Follow { server, robot, after } => {
             let writer = lines::Writer::new(server.open(10).await?, robot, after).await?;
-            let mut stop = signals()?;
+            let mut stop = signals.stop()?;
             tokio::select! {
                 done = writer.run() => done?,
                 _ = stop.changed() => {}
@@ -241,8 +250,8 @@ async fn run(command: Command) -> Result<(), Errors> {
     Ok(())
 }
 
-/// Parses the name of a worker, under which the server stores its status.
-fn worker_name(text: &str) -> Result<String, String> {
+/// Parses the name of a robot, or of a worker, under which the server stores its status.
+fn name(text: &str) -> Result<String, String> {
     let name = is_name(text).then(|| text.to_owned());
     name.ok_or_else(|| "a name has up to 64 letters, digits, `-` and `_`".to_owned())
 }
@@ -254,19 +263,39 @@ fn own_name() -> String {
     format!("{host}-{}-{:04x}", std::process::id(), fastrand::u16(..))
 }
 
-/// Returns a flag that becomes true on the first SIGINT, SIGTERM or SIGHUP. A second signal ends the program
-/// immediately.
-fn signals() -> Result<watch::Receiver<bool>, Message> {
-    let (stop, heard) = watch::channel(false);
-    let handler = move || {
-        if stop.send_replace(true) {
-            std::process::exit(130);
+/// SIGINT, SIGTERM and SIGHUP.
+#[derive(Default)]
+struct Signals {
+    stop: watch::Sender<bool>,
+    /// `true` if the first signal sets `stop`. Otherwise it ends the program.
+    is_orderly: Arc<AtomicBool>,
+}
+
+impl Signals {
+    /// Returns a flag that becomes true on the first signal. A second signal ends the program immediately.
+    fn stop(&self) -> Result<watch::Receiver<bool>, Message> {
+        let stop = self.stop.subscribe();
+        self.is_orderly.store(true, Ordering::Relaxed);
+        self.handle()?;
+        Ok(stop)
+    }
+
+    /// Installs the handler of signals, if it is not installed yet.
+    fn handle(&self) -> Result<(), Message> {
+        let (stop, is_orderly) = (self.stop.clone(), Arc::clone(&self.is_orderly));
+        let handler = move || {
+            if !is_orderly.load(Ordering::Relaxed) || stop.send_replace(true) {
+                std::process::exit(130);
+            }
+        };
+        match ctrlc::set_handler(handler) {
+            Ok(()) | Err(ctrlc::Error::MultipleHandlers) => Ok(()),
+            Err(error) => {
+                let text = format!("the signal handler cannot be installed: {error}");
+                Err(Message::error("N302", text))
+            }
         }
-    };
-    ctrlc::set_handler(handler).map_err(|error| {
-        Message::error("N302", format!("the signal handler cannot be installed: {error}"))
-    })?;
-    Ok(heard)
+    }
 }
 
 #[cfg(test)]
@@ -274,11 +303,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_workers_can_be_keys() {
-        let parse = |name| {
-            let words = ["metaplan-fleet", "worker", "--nats", "nats://h", "--missions", "m", "--name", name];
-            Arguments::try_parse_from(words).is_ok()
-        };
-        assert!(parse("a-b_1") && !parse("a b"));
+    fn names_of_workers_and_robots_can_be_keys() {
+        let parse = |words: &[&str]| Arguments::try_parse_from(words).is_ok();
+        let worker = ["metaplan-fleet", "worker", "--nats", "nats://h", "--missions", "m", "--name"];
+        let follow = ["metaplan-fleet", "follow", "--nats", "nats://h"];
+        for command in [&worker[..], &follow] {
+            assert!(parse(&[command, &["a-b_1"]].concat()) && !parse(&[command, &["a b"]].concat()));
+        }
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::ids::Membership;
-use crate::partition::{pause, persist};
+use crate::partition::repeat;
 use crate::store::{Fault, Message, Store, Stream};
 use crate::wire::{Address, Decided, Presence};
 use crate::worker::owners;
@@ -45,7 +45,7 @@ impl<S: Store> Sender<S> {
     /// sequence number of the event in the stream of events.
     ///
     /// # Errors
-    /// The event is longer than the server accepts.
+    /// The event is longer than the server accepts, or the log cannot be used any longer.
     pub async fn send(&mut self, event: &str) -> Result<u64, Fault> {
         self.number += 1;
         let subject = self.address.to_string();
@@ -57,15 +57,8 @@ impl<S: Store> Sender<S> {
                 id = format!("{id}:{spare}");
             }
             let message = Message { subject: &subject, id: &id, after: None, payload: event.as_bytes() };
-            let mut attempt = 1;
-            let receipt = loop {
-                match self.store.append(Stream::Events, message).await {
-                    Err(Fault::Unreachable(_)) => pause(attempt).await,
-                    other => break other?,
-                }
-                attempt += 1;
-            };
-            if !receipt.is_known || self.is_own(&subject, receipt.sequence, &id, event).await {
+            let receipt = repeat(|| self.store.append(Stream::Events, message)).await?;
+            if !receipt.is_known || self.is_own(&subject, receipt.sequence, &id, event).await? {
                 return Ok(receipt.sequence);
             }
         }
@@ -74,14 +67,15 @@ impl<S: Store> Sender<S> {
 
     /// Returns `true` if the event with this sequence number has the subject and payload that were sent, or was
     /// discarded after the robot's decision about it.
-    async fn is_own(&self, subject: &str, sequence: u64, id: &str, event: &str) -> bool {
-        let stored = persist(|| self.store.next(subject, sequence)).await;
+    async fn is_own(&self, subject: &str, sequence: u64, id: &str, event: &str) -> Result<bool, Fault> {
+        let stored = repeat(|| self.store.next(subject, sequence)).await?;
         if let Some(stored) = stored.filter(|stored| stored.sequence == sequence) {
-            return stored.payload == event.as_bytes();
+            return Ok(stored.payload == event.as_bytes());
         }
-        let last = persist(|| self.store.last(Stream::Decisions, subject)).await;
-        last.and_then(|last| Decided::parse(&last.payload))
-            .is_some_and(|last| last.state.ids.membership(id) != Membership::Absent)
+        let last = repeat(|| self.store.last(Stream::Decisions, subject)).await?;
+        Ok(last
+            .and_then(|last| Decided::parse(&last.payload))
+            .is_some_and(|last| last.state.ids.membership(id) != Membership::Absent))
     }
 }
 

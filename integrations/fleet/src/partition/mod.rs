@@ -7,6 +7,9 @@
 //! the reaction is published without a plan. Each further event is handled in the meantime. If it changes the planning
 //! problem, the search starts again. A further decision contains the plan.
 //!
+//! If something of a robot in memory is due without an event, for example because a sensor is silent, a decision about the
+//! passing of time follows.
+//!
 //! The state of a robot is part of its last decision. A decision is appended only if the robot's last decision has the
 //! expected sequence number, so only one of two workers can decide an event. A new owner of a partition reads the events
 //! that are still in the log, loads the last decision of their robots, and continues with the first undecided event.
@@ -19,7 +22,7 @@ mod threads;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
@@ -44,7 +47,7 @@ pub struct Settings {
     pub patience: Duration,
     /// Maximum number of robots in memory. Others are loaded from their last decision when they have events, and removed
     /// afterwards. Robots that are handling events may exceed this number. A robot is also removed ten minutes after its
-    /// last event or plan.
+    /// last event, timer or plan, unless it has another timer. A robot that is removed has no timers.
     pub warm: usize,
     /// Number of handled events after which the events of a robot are discarded.
     pub discard_every: usize,
@@ -155,14 +158,45 @@ pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, drain: watc
     }
 }
 
+/// Repeats an operation until it succeeds. After a permanent failure of the log, waits until the task is aborted.
 pub(crate) async fn persist<T, F: Future<Output = Result<T, Fault>>>(operation: impl Fn() -> F) -> T {
+    match repeat(operation).await {
+        Ok(value) => value,
+        Err(_) => std::future::pending().await,
+    }
+}
+
+/// Repeats an operation with growing pauses while the log is unreachable.
+///
+/// # Errors
+/// As for the operation, except [`Fault::Unreachable`].
+pub async fn repeat<T, F: Future<Output = Result<T, Fault>>>(operation: impl Fn() -> F) -> Result<T, Fault> {
     let mut attempt = 1;
     loop {
         match operation().await {
-            Ok(value) => return value,
-            Err(_) => pause(attempt).await,
+            Err(Fault::Unreachable(why)) => {
+                warn(attempt, &why);
+                pause(attempt).await;
+            }
+            outcome => return outcome,
         }
         attempt += 1;
+    }
+}
+
+/// Number of failed attempts without a warning.
+const SILENT_ATTEMPTS: u32 = 4;
+
+/// Minimum time between two warnings of the process.
+const WARNING_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Logs why an operation is repeated. The operations of all robots fail together, so most warnings are suppressed.
+pub(crate) fn warn(attempt: u32, why: &str) {
+    static LAST: Mutex<Option<Instant>> = Mutex::new(None);
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    if attempt > SILENT_ATTEMPTS && last.is_none_or(|last| last.elapsed() >= WARNING_INTERVAL) {
+        *last = Some(Instant::now());
+        tracing::warn!("the log does not respond, and the request is repeated: {why}");
     }
 }
 

@@ -10,14 +10,17 @@ use tokio::sync::watch;
 use tokio::task::JoinSet;
 
 use super::own::Inbox;
-use super::{Shared, pause, persist};
+use super::{Shared, pause, persist, warn};
 use crate::missions::Missions;
 use crate::robot::{Begun, Refused, Robot, Undecided, is_retirement};
 use crate::store::{Fault, Message, Store, Stored, Stream};
 use crate::wire::{Address, Decided};
 
-/// Time without an event or a plan after which a robot is removed from memory.
+/// Time without an event, a timer or a plan after which a robot is removed from memory.
 const MAX_IDLE: Duration = Duration::from_secs(600);
+
+/// Minimum time between an event or a timer and the next timer.
+const MIN_PAUSE: Duration = Duration::from_millis(10);
 
 /// Reason for a suspension: work on the robot has panicked, or the thread of a search could not be started.
 const PANICKED: &str = "its loop has panicked";
@@ -41,6 +44,10 @@ impl Drop for Count {
 struct Loaded {
     robot: Box<Robot>,
     chain: u64,
+    /// Time at which the last event or timer was decided, or, if this worker has decided none, the robot was loaded. The
+    /// pause to the next timer is measured from it. An event may have waited before, so a timer can be late, but is never
+    /// too early.
+    clock: Instant,
     /// Counts the loaded robots of the worker.
     _count: Count,
 }
@@ -67,6 +74,9 @@ fn panicked() -> Outcome {
 /// The plans of a search and the new estimate of the duration of a search. `None` if the search has panicked or could
 /// not be started.
 type Plans = Option<(Thoughts, Duration)>;
+
+/// A decision and the search that continues after it, or the reason why there is no decision.
+type Decision = Result<(Decided, Option<Planning>), Outcome>;
 
 /// A search for a plan that continues after the decision.
 struct Planning {
@@ -98,7 +108,7 @@ pub(super) struct Runner<S> {
     /// first of them.
     obsolete: usize,
     since: Option<Instant>,
-    /// Time of the last event or plan.
+    /// Time of the last event, timer or plan.
     used: Instant,
 }
 
@@ -133,7 +143,7 @@ impl<S: Store> Runner<S> {
                 continue;
             }
             let discard_at = self.since.map(|since| since + self.shared.settings.discard_within);
-            let unload_at = self.unload_at();
+            let (unload_at, due_at) = (self.unload_at(), self.due_at());
             let decided = self.loaded.as_ref().map_or(0, |loaded| loaded.robot.event);
             let Self { inbox, plans, shared, subject, .. } = &mut *self;
             tokio::select! {
@@ -144,6 +154,7 @@ impl<S: Store> Runner<S> {
                 event = inbox.next(&shared.store, subject, decided) => if let Some(event) = event {
                     self.handle(event).await;
                 },
+                () = until(due_at) => self.elapse().await,
                 () = until(unload_at) => self.loaded = None,
             }
             let is_unknown = self.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission().is_none());
@@ -177,9 +188,16 @@ impl<S: Store> Runner<S> {
     }
 
     /// Returns the time at which the robot is removed from memory. A robot with a missing plan stays, because plans for a
-    /// loop that was removed cannot be used.
+    /// loop that was removed cannot be used. So does a robot with a timer.
     fn unload_at(&self) -> Option<Instant> {
-        self.loaded.as_ref().filter(|_| self.is_idle()).map(|_| self.used + MAX_IDLE)
+        let is_removable = self.loaded.is_some() && self.is_idle() && self.due_at().is_none();
+        is_removable.then(|| self.used + MAX_IDLE)
+    }
+
+    /// Returns the time of the robot's next timer.
+    fn due_at(&self) -> Option<Instant> {
+        let Loaded { robot, clock, .. } = self.loaded.as_ref()?;
+        clock.checked_add(robot.pause()?.max(MIN_PAUSE))
     }
 
     /// Returns `true` if nothing has to be kept in memory.
@@ -199,6 +217,7 @@ impl<S: Store> Runner<S> {
 
     /// Handles an event until it is decided by this worker or another one, refused, or the robot cannot continue.
     async fn decide(&mut self, event: &Stored) -> Outcome {
+        let mut is_cached = self.loaded.is_some();
         // Loaded also for an event that is refused: afterwards, `register` checks if a plan is pending.
         self.load().await;
         let id = event.id.as_ref();
@@ -210,28 +229,70 @@ impl<S: Store> Runner<S> {
                 return Outcome::Known;
             }
             let begun = Instant::now();
-            let decision = self.decision(event).await;
+            let copy = event.clone();
+            let decision = self.decision(move |robot, missions| robot.begin(&copy, missions)).await;
             metrics::histogram!("metaplan_fleet_decision_seconds").record(begun.elapsed());
-            let (outcome, planning) = match decision {
-                Ok((decided, planning)) => (self.publish(decided, Some(event.time)).await, planning),
-                Err(outcome) => (outcome, None),
-            };
-            if !matches!(outcome, Outcome::Outdated) {
-                self.follow(planning);
+            let outcome = self.apply(decision, Some(event.time)).await;
+            // The log compares the chain only with decisions. A refusal by an outdated state would discard the event.
+            let is_refused = matches!(outcome, Outcome::Undecided(Undecided::Refused(_)));
+            if is_refused && is_cached && !self.is_last().await {
+                self.loaded = None;
+            } else if !matches!(outcome, Outcome::Outdated) {
                 return outcome;
             }
             // Another worker has decided, or an unacknowledged attempt has succeeded. The robot is loaded again to find
             // out.
+            is_cached = false;
             pause(attempt).await;
         }
         Outcome::Known
     }
 
-    /// Returns the decision about an event, and the search that continues if the decision lacks a plan.
-    async fn decision(&mut self, event: &Stored) -> Result<(Decided, Option<Planning>), Outcome> {
-        let (event, may_search) = (event.clone(), self.plans.is_empty());
+    /// Decides that time has passed, because something of the robot is due.
+    async fn elapse(&mut self) {
+        let Some(Loaded { clock, .. }) = &self.loaded else { return };
+        let passed = clock.elapsed();
+        let decision = self.decision(move |robot, missions| robot.begin_timer(passed, missions)).await;
+        let outcome = self.apply(decision, None).await;
+        self.register(None, outcome);
+        self.used = Instant::now();
+    }
+
+    /// Publishes a decision about an event, which was stored at `time`, or about the passing of time, and follows the
+    /// search that continues.
+    async fn apply(&mut self, decision: Decision, time: Option<u64>) -> Outcome {
+        let (decided, planning) = match decision {
+            Ok(decision) => decision,
+            Err(outcome) => return outcome,
+        };
+        if decided.migrated {
+            // A search for the former version of the mission has no use.
+            self.search.update(None);
+        }
+        let outcome = self.publish(decided, time).await;
+        if let Some(Loaded { clock, .. }) = &mut self.loaded {
+            *clock = Instant::now();
+        }
+        if !matches!(outcome, Outcome::Outdated) {
+            self.follow(planning);
+        }
+        outcome
+    }
+
+    /// Returns `true` if the robot's last decision is the loaded one.
+    async fn is_last(&mut self) -> bool {
+        let last = persist(|| self.shared.store.last(Stream::Decisions, &self.subject)).await;
+        last.map_or(0, |last| last.sequence) == self.load().await.chain
+    }
+
+    /// Returns the decision that `begin` begins, and the search that continues if the decision lacks a plan.
+    async fn decision(
+        &mut self,
+        begin: impl FnOnce(&mut Robot, &Missions) -> Result<Begun, Undecided> + Send + 'static,
+    ) -> Decision {
+        let may_search = self.plans.is_empty();
         let begin = move |robot: &mut Robot, missions: &Missions| {
-            let begun = robot.begin(&event, missions);
+            let begun = begin(robot, missions);
             let thinker = match &begun {
                 Ok(Begun::Search(_)) if may_search => robot.thinker(missions).ok().flatten(),
                 _ => None,
@@ -324,7 +385,8 @@ impl<S: Store> Runner<S> {
             let robot = last.map_or_else(Robot::default, |last| {
                 Decided::parse(&last.payload).map_or_else(Robot::unreadable, Robot::restore)
             });
-            Loaded { robot: Box::new(robot), chain, _count: Count::new(&self.shared.counts.robots) }
+            let (clock, _count) = (Instant::now(), Count::new(&self.shared.counts.robots));
+            Loaded { robot: Box::new(robot), chain, clock, _count }
         };
         self.loaded.insert(loaded)
     }
@@ -376,7 +438,7 @@ impl<S: Store> Runner<S> {
                     metrics::counter!("metaplan_fleet_fenced_total").increment(1);
                     break Outcome::Outdated;
                 }
-                Err(Fault::Unreachable(_)) => {}
+                Err(Fault::Unreachable(why) | Fault::Failed(why)) => warn(attempt, &why),
             }
             metrics::counter!("metaplan_fleet_retries_total").increment(1);
             pause(attempt).await;
@@ -386,7 +448,8 @@ impl<S: Store> Runner<S> {
         outcome
     }
 
-    /// Registers the outcome of an event, or, without a sequence number, of the start or the end of planning.
+    /// Registers the outcome of an event, or, without a sequence number, of a timer, or of the start or the end of
+    /// planning.
     fn register(&mut self, sequence: Option<u64>, outcome: Outcome) {
         let is_decided = matches!(outcome, Outcome::Decided);
         // If the robot was suspended, this decision has retired it.
@@ -439,6 +502,9 @@ impl<S: Store> Runner<S> {
     async fn discard(&mut self) {
         (self.obsolete, self.since) = (0, None);
         let last = self.handled - u64::from(self.pending.is_some() || self.is_kept);
+        if last == 0 {
+            return;
+        }
         if self.shared.store.discard(&self.subject, last).await.is_err() {
             // Another attempt follows.
             (self.obsolete, self.since) = (1, Some(Instant::now()));
@@ -533,17 +599,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a directory");
         let (store, missions) = (log(folder.path()), missions());
         let thinker = missions.get("uuv").expect("it exists").control.thinker();
-        let payload = br#"{"event": "enrol", "mission": "uuv"}"#.to_vec();
-        let event = Stored { sequence: 1, subject: "0.r".to_owned(), id: None, time: 0, payload };
-        let mut robot = Robot::default();
-        let Ok(Begun::Search(search)) = robot.begin(&event, &missions) else {
-            panic!("a search is necessary")
-        };
-        let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
-        let message = Message { subject: "0.r", id: "", after: Some(0), payload: &payload };
-        store.append(Stream::Decisions, message).await.expect("it is the first one");
-        let mut runner = runner(store, missions, Settings::default());
-        runner.load().await;
+        let mut runner = runner(store, missions.clone(), Settings::default());
+        enrol(&mut runner, "uuv", &missions).await;
         for is_unloaded in [false, true] {
             runner.search.begin(thinker.handle());
             if is_unloaded {
@@ -554,5 +611,72 @@ mod tests {
             runner.register(None, Outcome::Known);
             assert_eq!(runner.search.end(), is_unloaded);
         }
+    }
+
+    /// Appends the enrolment of the robot in memory and its decision without a plan.
+    async fn enrol(runner: &mut Runner<Local>, mission: &str, missions: &Missions) {
+        let payload = format!(r#"{{"event": "enrol", "mission": "{mission}"}}"#).into_bytes();
+        let event = Stored { sequence: 1, subject: "0.r".to_owned(), id: None, time: 0, payload };
+        let mut robot = Robot::default();
+        let Ok(Begun::Search(search)) = robot.begin(&event, missions) else {
+            panic!("a search is necessary")
+        };
+        let payload = serde_json::to_vec(&robot.finish(search, None)).expect("plain data");
+        let message = Message { subject: "0.r", id: "", after: Some(0), payload: &payload };
+        let store = &runner.shared.store;
+        store.append(Stream::Decisions, message).await.expect("it is the first one");
+        runner.load().await;
+    }
+
+    fn later(payload: &str) -> Stored {
+        Stored { sequence: 9, subject: "0.r".to_owned(), id: None, time: 0, payload: payload.into() }
+    }
+
+    #[tokio::test]
+    async fn a_search_for_the_former_version_of_a_mission_is_cancelled() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let text = std::fs::read_to_string(root.join("missions/ugv.toml")).expect("it can be read");
+        let text = text.replace("\"../", &format!("\"{}/", root.display()));
+        let versions =
+            [text.clone(), text.replacen("[knowledge]", "[adaptation]\nsettle = 1\n\n[knowledge]", 1)];
+        let directories = ["old", "new"].map(|name| folder.path().join(name));
+        for (directory, text) in directories.iter().zip(versions) {
+            std::fs::create_dir(directory).expect("it can be made");
+            std::fs::write(directory.join("ugv.toml"), text).expect("it can be written");
+        }
+        let read = |path| Missions::read(path).unwrap_or_else(|errors| panic!("{errors}"));
+        let (former, missions) = (read(&directories[0]), read(&directories[1]));
+        let missions = missions.with_former(&directories[0]).unwrap_or_else(|errors| panic!("{errors}"));
+        let thinker = former.get("ugv").expect("it exists").control.thinker();
+        let mut runner = runner(log(folder.path()), missions, Settings::default());
+        enrol(&mut runner, "ugv", &former).await;
+        for (event, is_cancelled) in [(r#"{"event": "tick"}"#, false), (r#"{"event": "migrate"}"#, true)] {
+            runner.search.begin(thinker.handle());
+            runner.plans.spawn(std::future::pending());
+            let event = Stored { sequence: 9 + u64::from(is_cancelled), ..later(event) };
+            runner.handle(event).await;
+            assert!(runner.pending.is_some());
+            assert_eq!(runner.search.end(), is_cancelled);
+        }
+    }
+
+    #[tokio::test]
+    async fn an_event_is_refused_only_by_the_state_after_the_last_decision() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let missions = missions();
+        let mut runner = runner(log(folder.path()), missions.clone(), Settings::default());
+        enrol(&mut runner, "ugv", &missions).await;
+        // Another owner retires the robot.
+        let retired = Decided { event: 8, retired: true, ..Decided::default() };
+        let payload = serde_json::to_vec(&retired).expect("plain data");
+        let message = Message { subject: "0.r", id: "", after: None, payload: &payload };
+        runner.shared.store.append(Stream::Decisions, message).await.expect("it can be written");
+        let enrolment = later(r#"{"event": "enrol", "mission": "uuv"}"#);
+        assert!(matches!(runner.decide(&enrolment).await, Outcome::Decided));
+        let again = Stored { sequence: 10, ..enrolment };
+        let outcome = runner.decide(&again).await;
+        let refused = Undecided::Refused(Refused::EnrolledAlready);
+        assert!(matches!(outcome, Outcome::Undecided(reason) if reason == refused));
     }
 }

@@ -124,6 +124,19 @@ impl Local {
         self.0.notices.subscribe()
     }
 
+    /// Waits until a transaction cannot be written. The log is then not usable any longer. Returns the reason.
+    pub async fn failure(&self) -> Fault {
+        let mut written = self.0.written.clone();
+        loop {
+            if let Some(fault) = self.0.failure.get() {
+                return fault.clone();
+            }
+            if let Err(error) = written.changed().await {
+                return Fault::Failed(error.to_string());
+            }
+        }
+    }
+
     async fn write(&self, write: Write) -> Answer {
         let (done, answer) = oneshot::channel();
         self.0.requests.send((write, done)).map_err(failed)?;
@@ -173,7 +186,8 @@ fn write(
         transaction.commit()?;
         Ok::<_, redb::Error>(answers)
     };
-    let answers = failure.get().map_or_else(|| transact().map_err(failed), |fault| Err(fault.clone()));
+    let transact = || transact().map_err(|error| Fault::Failed(error.to_string()));
+    let answers = failure.get().map_or_else(transact, |fault| Err(fault.clone()));
     if let Err(fault) = &answers {
         // The first reason is kept.
         let _ = failure.set(fault.clone());
@@ -334,6 +348,9 @@ impl Store for Local {
     }
 
     async fn announce(&self, worker: &str, status: Option<&Presence>) -> Result<(), Fault> {
+        if let Some(fault) = self.0.failure.get() {
+            return Err(fault.clone());
+        }
         let mut workers = self.0.workers.lock().unwrap_or_else(PoisonError::into_inner);
         workers.remove(worker);
         workers.extend(status.map(|status| (worker.to_owned(), (Instant::now(), status.clone()))));
@@ -355,16 +372,21 @@ impl Store for Local {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robots::Sender;
 
     #[tokio::test]
     async fn a_log_is_not_used_after_a_failed_transaction() {
         let folder = tempfile::tempdir().expect("a directory");
         let store = Local::open(folder.path(), 1, 8, Duration::from_secs(1))
             .unwrap_or_else(|message| panic!("{message}"));
-        let fault = Fault::Unreachable("no space left on device".to_owned());
+        let fault = Fault::Failed("no space left on device".to_owned());
         store.0.failure.set(fault.clone()).expect("there is no other failure");
         let message = Message { subject: "0.r", id: "", after: None, payload: b"x" };
         assert_eq!(store.append(Stream::Events, message).await, Err(fault.clone()));
-        assert_eq!(store.end(Stream::Events, 0).await, Err(fault));
+        assert_eq!(store.end(Stream::Events, 0).await, Err(fault.clone()));
+        // Otherwise the worker would be ready.
+        assert_eq!(store.announce("w", Some(&Presence::default())).await, Err(fault.clone()));
+        assert_eq!(Sender::new(store.clone(), "r", "").send("{}").await, Err(fault.clone()));
+        assert_eq!(store.failure().await, fault);
     }
 }

@@ -89,6 +89,9 @@ pub enum Fault {
     /// The result is unknown: the operation may still succeed. It has to be retried.
     #[error("{0}")]
     Unreachable(String),
+    /// The log cannot be used any longer, for example because its disk is full. Further attempts also fail.
+    #[error("{0}")]
+    Failed(String),
 }
 
 fn failed(error: impl std::fmt::Display) -> Fault {
@@ -121,7 +124,7 @@ pub trait Store: Clone + Send + Sync + 'static {
     /// one that [`Message::after`] requires.
     async fn append(&self, stream: Stream, message: Message<'_>) -> Result<Receipt, Fault>;
 
-    /// Removes the events of a subject up to and including a sequence number.
+    /// Removes the events of a subject up to and including a sequence number, which is at least 1.
     async fn discard(&self, subject: &str, last: u64) -> Result<(), Fault>;
 
     /// Returns the last message of a subject, or `None` if the subject has no message.

@@ -40,7 +40,7 @@ pub struct Access {
     /// Password of the user.
     #[arg(skip = std::env::var("NATS_PASSWORD").unwrap_or_default())]
     pub password: String,
-    /// Trust the certificate authorities in this file in addition to those of the system.
+    /// Trust only the certificate authorities in this file, instead of those of the system.
     #[arg(long, value_name = "FILE")]
     pub tls_ca: Option<PathBuf>,
     /// Authenticate with the client certificate in the first file and its key in the second file.

@@ -58,8 +58,7 @@ class Cluster:
 
         def address(match):
             host = {"0.0.0.0": container, "127.0.0.1": container, "nats": "nats-0"}.get(match[2], match[2])
-            scheme = (match[1] or "").replace("tls:", "nats:")
-            return f"{scheme}127.0.0.1:{self.port(host, match[3])}"
+            return f"{match[1] or ''}127.0.0.1:{self.port(host, match[3])}"
 
         text = re.sub(r"(\w+://)?\b([\w.-]+):(\d+)\b", address, text)
         return text.replace("/usr/share/metaplan", f"{self.directory}/image")
@@ -159,7 +158,9 @@ def test_workers_of_both_files_work_on_them(cluster):
         words = [cluster.mapped(name, word) for word in shlex.split(WORKER["command"])]
         cluster.start(name, [PROGRAM, *words], **environment)
     # The servers of this test have neither TLS nor credentials.
-    words = [cluster.mapped("pod", word.replace("$(POD)", "pod")) for word in POD["args"] if not word.startswith("--creds")]
+    secrets = ("--creds", "--tls-ca")
+    words = [cluster.mapped("pod", word.replace("$(POD)", "pod")) for word in POD["args"] if not word.startswith(secrets)]
+    words = [word.replace("tls:", "nats:") for word in words]
     cluster.start("pod", [PROGRAM, *words])
     ports = {port["name"]: port["containerPort"] for port in POD["ports"]}
     for name in ("startupProbe", "readinessProbe", "livenessProbe"):
@@ -235,11 +236,90 @@ def test_a_refused_user_is_an_error_at_once(tmp_path):
 def server(tmp_path):
     own = Cluster(tmp_path)
     port = own.port("server", 4222)
-    own.start("server", [NATS, "--js", "--sd", f"{tmp_path}/server", "--addr", "127.0.0.1", "--port", str(port)])
+    words = ["--js", "--sd", f"{tmp_path}/server", "--addr", "127.0.0.1", "--port", str(port)]
+    own.start("server", [NATS, *words, "--http_port", str(own.port("server", 8222))])
     try:
         yield own, f"nats://127.0.0.1:{port}"
     finally:
         own.stop()
+
+
+def certify(directory):
+    """Creates a certificate authority `ca.crt`, and a certificate of it for 127.0.0.1, `server.crt` with `server.key`."""
+
+    def openssl(*words):
+        subprocess.run(["openssl", *words], cwd=directory, capture_output=True, check=True)
+
+    key = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2")
+    openssl("req", "-x509", *key, "-keyout", "ca.key", "-out", "ca.crt", "-subj", "/CN=test")
+    openssl("req", *key, "-keyout", "server.key", "-out", "server.csr", "-subj", "/CN=server")
+    (directory / "names").write_text("subjectAltName=IP:127.0.0.1")
+    authority = ("-CA", "ca.crt", "-CAkey", "ca.key", "-CAcreateserial")
+    openssl("x509", "-req", "-in", "server.csr", *authority, "-days", "2", "-extfile", "names", "-out", "server.crt")
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not there")
+def test_a_pod_trusts_the_certificate_authority_of_its_secret(tmp_path):
+    image(tmp_path)
+    certify(tmp_path)
+    own = Cluster(tmp_path)
+    url = f"tls://127.0.0.1:{own.port('nats-0', 4222)}"
+    tls = ["--tls", "--tlscert", f"{tmp_path}/server.crt", "--tlskey", f"{tmp_path}/server.key"]
+    store = ["--js", "--sd", f"{tmp_path}/server"]
+    try:
+        own.start("server", [NATS, *store, *tls, "--addr", "127.0.0.1", "--port", url.rpartition(":")[2]])
+        # There is one server, and it needs no credentials.
+        words = [word for word in POD["args"] if not word.startswith(("--creds", "--replicas"))]
+        words = [own.mapped("pod", word.replace("$(POD)", "pod")) for word in words]
+        own.start("pod", [PROGRAM, *(word.replace("/secrets/", f"{tmp_path}/") for word in words)])
+        own.wait("a worker that is ready", lambda: own.get("pod", f"http://127.0.0.1:9464{POD['readinessProbe']['httpGet']['path']}"))
+        out = call("status", "--nats", url)
+        assert out.returncode == 2 and "error[N311]" in out.stderr, out.stderr
+    finally:
+        own.stop()
+
+
+def can_isolate():
+    return bool(shutil.which("unshare")) and subprocess.run(["unshare", "-rpf", "true"], capture_output=True, check=False).returncode == 0
+
+
+@pytest.mark.skipif(not can_isolate(), reason="there are no namespaces for processes")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_ends_a_program_that_is_process_1(tmp_path, name):
+    own = Cluster(tmp_path)
+    try:
+        words = [PROGRAM, "send", "--nats", f"nats://127.0.0.1:{free_port()}", "--wait", "600"]
+        own.start("send", ["unshare", "-rpf", "--kill-child", *words])
+        own.wait("a program that waits for servers", lambda: "the servers are not ready" in own.log("send"))
+        unshare = own.processes["send"]
+        (program,) = Path(f"/proc/{unshare.pid}/task/{unshare.pid}/children").read_text().split()
+        os.kill(int(program), signal.Signals[name])
+        assert unshare.wait(SECONDS) == 130
+    finally:
+        own.stop()
+
+
+def test_a_line_that_is_not_acknowledged_is_repeated_with_a_warning(server):
+    cluster, url = server
+    assert call("status", "--nats", url).returncode == 0
+    log = cluster.directory / "send.log"
+    words = [PROGRAM, "send", "--nats", url]
+    with log.open("w") as errors, subprocess.Popen(words, stdin=subprocess.PIPE, stderr=errors, text=True) as sending:
+        try:
+            # The program is connected when its first line is stored.
+            sending.stdin.write('r {"event": "tick"}\n')
+            sending.stdin.flush()
+            cluster.wait("a stored line", lambda: "last_seq\": 1" in (cluster.get("server", "http://127.0.0.1:8222/jsz?streams=1") or ""))
+            cluster.processes["server"].send_signal(signal.SIGSTOP)
+            sending.stdin.write('r {"event": "tick"}\n')
+            sending.stdin.close()
+            cluster.wait("a warning", lambda: "the log does not respond" in log.read_text())
+            assert sending.poll() is None
+            cluster.processes["server"].send_signal(signal.SIGCONT)
+            assert sending.wait(SECONDS) == 0, log.read_text()
+        finally:
+            cluster.processes["server"].send_signal(signal.SIGCONT)
+            sending.kill()
 
 
 def call(*words, text=""):

@@ -80,6 +80,15 @@ def test_pods_are_restricted():
         assert context["capabilities"] == {"drop": ["ALL"]}
 
 
+def test_pods_with_tls_have_a_certificate_authority():
+    """The public authorities of the image do not sign names inside a cluster."""
+    pod = KINDS["StatefulSet"]["spec"]["template"]["spec"]
+    for container in pod["containers"]:
+        arguments = dict(word.removeprefix("--").partition("=")[::2] for word in container["args"])
+        assert arguments["nats"].startswith("tls://")
+        assert any(arguments["tls-ca"].startswith(f"{mount['mountPath']}/") for mount in container["volumeMounts"])
+
+
 def test_services_of_compose_drop_capabilities():
     for name, service in COMPOSE["services"].items():
         assert service["cap_drop"] == ["ALL"] and "no-new-privileges:true" in service["security_opt"], name

@@ -2,8 +2,8 @@
 //! decided twice.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use delegate::delegate;
@@ -28,14 +28,16 @@ struct Crashing {
     stuck: &'static str,
     /// Number of attempts to discard events that still fail.
     failing: Arc<AtomicU64>,
+    /// Sequence numbers up to which events were discarded.
+    discarded: Arc<Mutex<Vec<u64>>>,
     over: Arc<Notify>,
 }
 
 impl Crashing {
     fn new(fleet: &Fleet, operations: u64) -> Self {
         let (inner, operations) = (fleet.store.clone(), Arc::new(operations.into()));
-        let (failing, over) = (Arc::default(), Arc::default());
-        Self { inner, operations, carries_out: false, fences: true, stuck: "", failing, over }
+        let (failing, discarded, over) = (Arc::default(), Arc::default(), Arc::default());
+        Self { inner, operations, carries_out: false, fences: true, stuck: "", failing, discarded, over }
     }
 
     /// Counts an operation, and executes it if the limit is not reached. Otherwise the returned
@@ -85,6 +87,7 @@ impl Store for Crashing {
         if decrement(&self.failing).is_ok() {
             return Err(Fault::Unreachable("no server".to_owned()));
         }
+        self.discarded.lock().expect("no panic").push(last);
         self.through(self.inner.discard(subject, last)).await
     }
 
@@ -206,4 +209,19 @@ async fn a_search_gives_up_its_place_while_its_robot_waits_for_the_log() {
     fleet.tell("r", &[ENROL]).await;
     let has_plan = async || fleet.of("r").await.iter().any(|decided| decided.planned);
     until("the place is not free", has_plan).await;
+}
+
+/// NATS servers before 2.12.10 would remove all events of the robot.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn no_request_discards_the_events_up_to_the_number_0() {
+    let fleet = Fleet::new(1);
+    let crashing = Crashing::new(&fleet, u64::MAX);
+    let discarded = Arc::clone(&crashing.discarded);
+    let settings = Settings { discard_every: 1, patience: Duration::ZERO, ..patient() };
+    let _owner = Running::owner(shared(crashing, "first", settings));
+    // The first event of the log is kept until its plan is found.
+    fleet.tell("r", &[ENROL]).await;
+    fleet.settle().await;
+    let discarded = discarded.lock().expect("no panic");
+    assert!(!discarded.is_empty() && !discarded.contains(&0), "{discarded:?}");
 }

@@ -1,5 +1,6 @@
 //! Fleets in a directory, with their robots and workers.
 
+use std::fs;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
@@ -57,6 +58,17 @@ pub(super) async fn heard(notices: &mut broadcast::Receiver<(String, String)>) -
 
 pub(super) fn event(sequence: u64, payload: &str) -> Stored {
     Stored { sequence, subject: "0.r".to_owned(), id: None, time: 0, payload: payload.into() }
+}
+
+/// Creates a directory with a version of the mission `ugv` that has these settings of the adaptation.
+pub(super) fn write_version(directory: &Path, settings: &str) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("it exists");
+    let text = fs::read_to_string(root.join("missions/ugv.toml")).expect("it can be read");
+    let text = text.replace("\"../", &format!("\"{}/", root.display()));
+    let adaptation = format!("[adaptation]\n{settings}\n\n[knowledge]");
+    let text = if settings.is_empty() { text } else { text.replacen("[knowledge]", &adaptation, 1) };
+    fs::create_dir(directory).expect("it can be made");
+    fs::write(directory.join("ugv.toml"), text).expect("it can be written");
 }
 
 /// A fleet in a directory, which is removed at the end.

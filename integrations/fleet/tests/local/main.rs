@@ -9,6 +9,7 @@ mod hostile;
 mod planning;
 mod program;
 mod scripts;
+mod timers;
 mod versions;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -52,7 +52,8 @@ pub(super) fn assert_replayed(
     decided: &[Decided],
     sequences: &[u64],
 ) -> usize {
-    let made: Vec<u64> = decided.iter().filter(|made| !made.planned).map(|made| made.event).collect();
+    let has_event = |made: &&Decided| !made.planned && !made.timer;
+    let made: Vec<u64> = decided.iter().filter(has_event).map(|made| made.event).collect();
     assert_eq!(made, sequences, "{robot}: each event once, in order");
     let Setup { mission, settings, .. } = setup(mission);
     let initial = Loop::new(mission, settings).unwrap_or_else(|errors| panic!("{errors}"));
@@ -61,7 +62,9 @@ pub(super) fn assert_replayed(
     let (mut waiting, mut compared) = (0, 0);
     for (number, made) in decided.iter().enumerate() {
         let mut answers = Vec::new();
-        if !made.planned {
+        if made.timer {
+            answers.extend(control.react(&Observation::timer(), Duration::from_micros(made.now)));
+        } else if !made.planned {
             let event = events.next().expect("there are as many events");
             // The first event enrols the robot.
             if number > 0 {

@@ -2,21 +2,21 @@
 //! suspended until their version is back or they are retired.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use metaplan_fleet::missions::Missions;
 use metaplan_fleet::partition::{Settings, Shared};
-use metaplan_fleet::robot::{Robot, Undecided};
+use metaplan_fleet::robot::{Begun, Robot, Undecided};
 use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::{Stored, Stream};
 use metaplan_fleet::wire::{Decided, State};
 use tempfile::TempDir;
 
-use super::harness::{Client, ENROL, Fleet, LOST, RETIRE, Running, TICK, event, heard, patient, until};
+use super::harness::{
+    Client, ENROL, Fleet, LOST, RETIRE, Running, TICK, event, heard, patient, until, write_version,
+};
 use super::scripts;
 
 /// A fleet with one partition, and directories with two versions of the mission `ugv`: the original, and one with a
@@ -29,14 +29,8 @@ struct Versions {
 impl Versions {
     fn new() -> Self {
         let (fleet, folder) = (Fleet::new(1), tempfile::tempdir().expect("a directory"));
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("it exists");
-        let text = fs::read_to_string(root.join("missions/ugv.toml")).expect("it can be read");
-        let text = text.replace("\"../", &format!("\"{}/", root.display()));
-        let new = text.replacen("[knowledge]", "[adaptation]\nsettle = 1\n\n[knowledge]", 1);
-        for (name, text) in [("old", text), ("new", new)] {
-            fs::create_dir(folder.path().join(name)).expect("it can be made");
-            fs::write(folder.path().join(name).join("ugv.toml"), text).expect("it can be written");
-        }
+        write_version(&folder.path().join("old"), "");
+        write_version(&folder.path().join("new"), "settle = 1");
         Self { fleet, folder }
     }
 
@@ -170,6 +164,29 @@ async fn a_robot_changes_its_version_at_the_end_of_an_action() {
     let has = |decided: &Decided, kind: &str| decided.answers.iter().any(|answer| answer["answer"] == kind);
     assert!(has(&made[1], "inferred") && !has(&made[5], "inferred"), "{:?}", made[5].answers);
     assert!(has(&made[4], "plan_found"), "{:?}", made[4].answers);
+}
+
+/// The loops of both versions count their planning problems from 0.
+#[test]
+fn plans_of_the_former_version_are_not_adopted_after_a_migration() {
+    let versions = Versions::new();
+    let missions = versions.missions(&["new", "old"]);
+    for is_late in [false, true] {
+        let mut robot = Robot::default();
+        let begun = robot.begin(&event(1, ENROL), &versions.missions(&["old"]));
+        let Ok(Begun::Search(search)) = begun else { panic!("a search is necessary") };
+        let mut robot = Robot::restore(robot.finish(search, None));
+        let thinker =
+            |robot: &mut Robot| robot.thinker(&missions).expect("it is loaded").expect("it is pending");
+        let former = thinker(&mut robot).think();
+        let Ok(Begun::Search(search)) = robot.begin(&event(2, r#"{"event": "migrate"}"#), &missions) else {
+            panic!("a search is necessary")
+        };
+        assert!(robot.finish(search, None).migrated);
+        assert_eq!(robot.plan(former, is_late), None);
+        let current = thinker(&mut robot).think();
+        assert!(robot.plan(current, is_late).is_some_and(|decided| decided.planned && !decided.late));
+    }
 }
 
 const SETS: [&[&str]; 4] = [&["old"], &["new"], &["new", "old"], &["old", "new"]];
