@@ -55,13 +55,14 @@ fn narrow(domain: &Domain, problem: &Problem, completed: &HashSet<Name>) -> (Dom
     let facts = facts_of(&|predicate| completed.contains(predicate));
     let heads = domain.derived.iter().map(|axiom| &axiom.head.identifier.name);
     let varying = mentioned.changed.iter().chain(heads).cloned().collect();
-    let mut guards: Guards = settle::guards(domain, &varying, &mentioned.timed);
+    let guarding = settle::with_certain_conditions(domain, problem);
+    let mut guards: Guards = settle::guards(&guarding, &varying, &mentioned.timed);
     guards.retain(|guard @ (predicate, _, class)| {
         completed.contains(predicate)
             && completed.contains(class)
             && facts.iter().all(|fact| settle::keeps(fact, guard, &facts))
     });
-    let folded = Folded::new(domain, (&mentioned.changed, &mentioned.timed), &guards, completed);
+    let folded = Folded::new(&guarding, (&mentioned.changed, &mentioned.timed), &guards, completed);
     // An axiom of the domain can conclude a predicate of the knowledge base from a predicate of the domain.
     let premises = folded.premises();
     let facts = facts_of(&|predicate| completed.contains(predicate) || premises.contains(predicate));

@@ -16,9 +16,11 @@
 //!
 //! \[1\] H. Tamaki, T. Sato: Unfold/fold transformation of logic programs, ICLP 1984.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Name, Term};
+use pddl::Signs;
+use pddl::ast::{Action, ActionBody, Atom, Condition, ConditionTime, Domain, Effect, Name, Problem, Term};
 
 use super::clause::{Clause, Fact, Literal, MAX_CLAUSES, Operand};
 
@@ -29,8 +31,23 @@ const MAX_DEPTH: usize = 8;
 /// the class.
 pub(super) type Guards = BTreeSet<(Name, usize, Name)>;
 
-/// Returns the guards of a domain: the classes that all actions require of the arguments of facts
-/// that they add. `varying` contains the predicates that actions or timed initial literals change
+/// Returns the domain without the conditions over all of the actions whose duration may be 0. They do not apply to this
+/// duration, so an action may add facts although it violates them.
+pub(super) fn with_certain_conditions<'d>(domain: &'d Domain, problem: &Problem) -> Cow<'d, Domain> {
+    let signs = Signs::new(domain, problem);
+    let mut certain = Cow::Borrowed(domain);
+    for (position, action) in domain.actions.iter().enumerate().filter(|(_, a)| signs.admit_zero(&a.body)) {
+        let mut action = action.clone();
+        if let ActionBody::Durative { conditions, .. } = &mut action.body {
+            conditions.retain(|(time, _)| *time != ConditionTime::OverAll);
+        }
+        certain.to_mut().actions[position] = action;
+    }
+    certain
+}
+
+/// Returns the guards of a domain without uncertain conditions: the classes that all actions require of the arguments of
+/// facts that they add. `varying` contains the predicates that actions or timed initial literals change
 /// and the derived predicates; they do not count as classes, because members of a class must be
 /// fixed by the initial state. Predicates in `timed` have no guards.
 pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet<Name>) -> Guards {

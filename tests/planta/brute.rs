@@ -4,7 +4,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use pddl::ast::{ActionBody, Condition, Domain, Effect, InitialElement, Problem, Term, TypeExpression};
+use num_traits::Signed as _;
+use pddl::ast::{
+    ActionBody, Comparison, Condition, ConditionTime, Domain, DurationConstraint, Effect, EffectTime,
+    Expression, InitialElement, Problem, Term, TypeExpression,
+};
 
 /// A fact or a ground action in lower case: its words, separated by spaces.
 pub type Text = String;
@@ -96,14 +100,12 @@ impl Task {
         let (rules, schemas, initial) = (Vec::new(), Vec::new(), Facts::new());
         let mut task = Self { objects, rules, schemas, initial, goal: truth, counter: 0 };
         for action in &domain.actions {
-            let ActionBody::Instantaneous { precondition, effect } = &action.body else {
-                panic!("no durations here")
-            };
+            let (precondition, effect) = joint(&action.body);
             let mut scope = Binding::new();
             let (parameters, type_conditions) = task.declare(&action.parameters, &mut scope);
-            let body = task.part(precondition, &scope);
+            let body = task.part(&precondition, &scope);
             let (mut adds, mut deletes) = (Vec::new(), Vec::new());
-            changes(effect, &scope, &mut adds, &mut deletes);
+            changes(&effect, &scope, &mut adds, &mut deletes);
             let body = Part::And(type_conditions.into_iter().chain([body]).collect());
             task.schemas.push(Schema { name: low(&action.identifier.name), parameters, body, adds, deletes });
         }
@@ -392,6 +394,36 @@ impl Task {
             layer = next;
         }
         Some(space)
+    }
+}
+
+/// Returns the condition and the effect of an action. All effects of a durative action must be at its end, so all its
+/// conditions apply to the state in which it starts, without those over all if the duration is 0.
+fn joint(body: &ActionBody) -> (Condition, Effect) {
+    match body {
+        ActionBody::Instantaneous { precondition, effect } => (precondition.clone(), effect.clone()),
+        ActionBody::Durative { duration, conditions, effects } => {
+            let [
+                DurationConstraint {
+                    operator: Comparison::Equal,
+                    expression: Expression::Number(number, _),
+                    ..
+                },
+            ] = &duration[..]
+            else {
+                panic!("only constant durations here")
+            };
+            assert!(
+                effects.iter().all(|(time, _)| *time == EffectTime::AtEnd),
+                "only effects at the end here"
+            );
+            let is_checked = |time: ConditionTime| number.is_positive() || time != ConditionTime::OverAll;
+            let conditions = conditions.iter().filter(|(time, _)| is_checked(*time));
+            (
+                Condition::And(conditions.map(|(_, condition)| condition.clone()).collect()),
+                Effect::And(effects.iter().map(|(_, effect)| effect.clone()).collect()),
+            )
+        }
     }
 }
 

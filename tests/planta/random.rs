@@ -123,7 +123,7 @@ fn texts(seed: u64) -> Texts {
     let mut random = Rng::with_seed(seed);
     let knowledge = knowledge(&axioms(&mut random));
     let mut domain =
-        "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x) (charged ?x)"
+        "(define (domain d) (:requirements :strips :derived-predicates :durative-actions)\n (:predicates (done ?x) (charged ?x)"
             .to_owned();
     let has_axiom = random.u8(..10) < 4;
     if has_axiom {
@@ -145,10 +145,22 @@ fn texts(seed: u64) -> Texts {
         if random.bool() {
             conditions.push(condition(&mut random, has_axiom));
         }
-        let effects: Vec<String> = (0..random.usize(1..3)).map(|_| effect(&mut random)).collect();
+        let mut effects: Vec<String> = (0..random.usize(1..3)).map(|_| effect(&mut random)).collect();
+        let (kind, duration, condition) = if random.u8(..10) < 3 {
+            for condition in &mut conditions {
+                *condition =
+                    format!("({} {condition})", pick(&mut random, &["at start", "over all", "at end"]));
+            }
+            for effect in &mut effects {
+                *effect = format!("(at end {effect})");
+            }
+            ("durative-action", format!(":duration (= ?duration {})", random.u8(..2)), "condition")
+        } else {
+            ("action", String::new(), "precondition")
+        };
         let _ = write!(
             domain,
-            "\n (:action a{number} :parameters (?x ?y) :precondition (and {}) :effect (and {}))",
+            "\n (:{kind} a{number} :parameters (?x ?y) {duration} :{condition} (and {}) :effect (and {}))",
             conditions.join(" "),
             effects.join(" ")
         );
@@ -238,6 +250,39 @@ fn classes_required_by_one_action_do_not_guard_facts_of_others() {
     let problem = "(define (problem p) (:domain d) (:init) (:goal (done i2)))\n".to_owned();
     let comparison = compare(&Texts { knowledge, domain, problem }, "two actions").expect("few states");
     assert_eq!(comparison.least_steps, Some(2));
+}
+
+/// Conditions over all do not apply to the duration 0, so they do not restrict the facts that the action adds.
+#[test]
+fn conditions_over_all_guard_facts_only_if_the_duration_is_positive() {
+    let knowledge = knowledge(
+        "ClassAssertion(:Ce :i1) ClassAssertion(:Ca :i2) ClassAssertion(:Cb :i2) ObjectPropertyDomain(:pa :Ca)\n",
+    );
+    for (duration, value, status) in [
+        ("0", "0", "optimal"),
+        ("(span)", "0", "optimal"),
+        ("1", "1", "unsolvable"),
+        ("(+ 1 (span))", "1", "unsolvable"),
+    ] {
+        let domain = format!(
+            "(define (domain d) (:requirements :derived-predicates :durative-actions :numeric-fluents)\n (:functions (span))
+ (:durative-action a :parameters (?x ?y) :duration (= ?duration {duration})
+  :condition (and (over all (Ca ?x)) (at start (Cb ?y))) :effect (at end (pa ?x ?y))))\n"
+        );
+        let problem =
+            "(define (problem p) (:domain d) (:init (= (span) 0)) (:goal (inferred-Ca i1)))\n".to_owned();
+        let directory = tempfile::tempdir().expect("a directory");
+        let input = Texts { knowledge: knowledge.clone(), domain, problem }.write(directory.path());
+        let (_, stdout, stderr) = metaplan(&input.arguments("plan", &["--format", "json"]));
+        let answer: serde_json::Value = serde_json::from_str(&stdout).unwrap_or_else(|_| panic!("{stderr}"));
+        assert_eq!(answer["status"], status, "{duration}: {answer}");
+        let plan = directory.path().join("plan.txt");
+        std::fs::write(&plan, format!("0: (a i1 i2) [{value}]\n")).expect("the plan is written");
+        let mut arguments = input.arguments("validate", &[]);
+        arguments.insert(3, plan.to_str().expect("UTF-8"));
+        let (exit, stdout, stderr) = metaplan(&arguments);
+        assert_eq!(exit == 0, status == "optimal", "{duration}: {stdout}{stderr}");
+    }
 }
 
 /// A variable of a rule may have the name of another rule's variable, followed by `~` and a number.
