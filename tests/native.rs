@@ -293,8 +293,7 @@ fn check_small(knowledge: &str, domain: &str, bindings: &[(&str, &str)], cost: &
     let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0) (open)) (:goal (done))
         (:metric minimize (total-cost)))";
     let bindings = bindings.iter().map(|(symbol, query)| ((*symbol).to_owned(), (*query).to_owned()));
-    let knowledge = format!("{PREFIX}{knowledge}");
-    let mission = read(directory.path(), &knowledge, domain, problem, &bindings.collect());
+    let mission = read(directory.path(), knowledge, domain, problem, &bindings.collect());
     let (status, actual, steps) =
         answer(&mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}")));
     assert_eq!((status, actual.as_deref()), (Status::Optimal, Some(cost)), "{domain}");
@@ -313,11 +312,12 @@ fn a_change_to_a_design_without_an_estimation_is_free() {
                 :effect (and (done) (increase (total-cost) 1) (increase (total-cost) (change)))))"
         )
     };
+    let knowledge = format!("{PREFIX}{CHANGE}");
     let bindings = [("change", "reconfigured:start"), ("used", "chosen:start")];
-    check_small(CHANGE, &domain("(change)", "0"), &bindings[..1], "2", &["fd_lidar", "fd_camera"]);
+    check_small(&knowledge, &domain("(change)", "0"), &bindings[..1], "2", &["fd_lidar", "fd_camera"]);
     // The chosen design of `first` costs 4. A sum over chosen designs is undefined without an estimation, so it has
     // another function than the sum over newly chosen designs.
-    check_small(CHANGE, &domain("(change) (used)", "(used)"), &bindings, "6", &["fd_lidar", "fd_camera"]);
+    check_small(&knowledge, &domain("(change) (used)", "(used)"), &bindings, "6", &["fd_lidar", "fd_camera"]);
 }
 
 #[test]
@@ -326,7 +326,7 @@ fn a_context_that_ends_at_the_start_of_an_action_counts() {
         (:functions (total-cost) (effort))
         (:durative-action enter :parameters () :duration (= ?duration 1) :condition (at start (open))
           :effect (and (at start (not (open))) (at end (done)) (at end (increase (total-cost) (effort))))))";
-    check_small(CONTEXT, domain, &[], "2", &["fd_b"]);
+    check_small(&format!("{PREFIX}{CONTEXT}"), domain, &[], "2", &["fd_b"]);
 }
 
 /// A mission with one action, which takes `duration` and has the designs and the bound of `knowledge`.
@@ -404,6 +404,33 @@ fn conditions_on_designs_follow_the_durations_of_the_situation() {
     assert_eq!(designs(&mission), None);
     mission.set("span", "3").expect("a value");
     assert_eq!(text(&mission), positive);
+}
+
+/// No design of `f1` has an estimation of the bounded attribute, so the bound does not apply to `f1`. The design `fd_a`
+/// also serves `f2`, to which the bound applies.
+#[test]
+fn a_bound_applies_to_the_functions_with_estimations() {
+    // TOMASys itself admits only one function per design.
+    let prefix = PREFIX.replace(" ; owl:imports <http://metacontrol.org/tomasys>", "");
+    let knowledge = ":f1 a t:Function . :f2 a t:Function . :safety a t:QualityAttributeType .
+        :careful a t:Requirement ; t:isQAtype :safety ; t:hasMinimum 0.5 .
+        :a_first a t:Action ; t:requiresF :f1 ; t:requiresQuality :careful .
+        :a_second a t:Action ; t:requiresF :f2 ; t:requiresQuality :careful .
+        :a_both a t:Action ; t:requiresF :f1 , :f2 ; t:requiresQuality :careful .
+        :fd_a a t:FunctionDesign ; t:solvesF :f1 , :f2 .
+        :fd_b a t:FunctionDesign ; t:solvesF :f2 ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :safety ; t:hasValue 0.9 ] .";
+    let domain = |actions: &str| {
+        format!("(define (domain d) (:predicates (open) (one) (done)) (:functions (total-cost)) {actions})")
+    };
+    let first =
+        "(:action first :parameters () :precondition (open) :effect (and (one) (increase (total-cost) 1)))";
+    let second =
+        "(:action second :parameters () :precondition (one) :effect (and (done) (increase (total-cost) 1)))";
+    let both =
+        "(:action both :parameters () :precondition (open) :effect (and (done) (increase (total-cost) 1)))";
+    let knowledge = format!("{prefix}{knowledge}");
+    check_small(&knowledge, &domain(&format!("{first} {second}")), &[], "2", &["fd_a", "fd_b"]);
+    check_small(&knowledge, &domain(both), &[], "1", &["fd_a", "fd_b"]);
 }
 
 /// One function with one design. The statements of a test are added to these.

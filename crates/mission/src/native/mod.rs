@@ -539,7 +539,8 @@ impl CoAdaptation {
 }
 
 /// Returns two lists of conditions on the designs of an action: those that must hold when the
-/// action starts, and those that must hold during the action.
+/// action starts, and those that must hold during the action. A quality bound does not apply to a function if no design
+/// of the function has an estimate of the attribute.
 fn conditions(
     designs: &[(Identifier, &Needed)],
     needs: &Needs,
@@ -549,7 +550,8 @@ fn conditions(
     for (design, needed) in designs {
         chosen.push(Condition::Atom(of_design(SOLVES, design, Some(&needed.name))));
         lasting.push(Condition::Atom(of_design(AVAILABLE, design, None)));
-        for quality in &needs.quality {
+        let applies = |quality: &&Quality| needed.attributes.contains(&quality.bounds.attribute);
+        for quality in needs.quality.iter().filter(applies) {
             let kept = Condition::Atom(of_design(meets(quality).as_str(), design, None));
             let context = quality.context.as_ref().and_then(|context| {
                 domain.predicates.iter().find(|p| p.identifier.name == Name::new(context))
