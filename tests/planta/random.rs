@@ -151,7 +151,9 @@ fn texts(seed: u64) -> Texts {
                 *condition =
                     format!("({} {condition})", pick(&mut random, &["at start", "over all", "at end"]));
             }
-            effects.iter_mut().for_each(|effect| *effect = format!("(at end {effect})"));
+            for effect in &mut effects {
+                *effect = format!("(at end {effect})");
+            }
             ("durative-action", format!(":duration (= ?duration {})", random.u8(..2)), "condition")
         } else {
             ("action", String::new(), "precondition")
