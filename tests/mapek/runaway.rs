@@ -7,13 +7,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use metaplan::journal::{Journal, Policy, Sync};
-use metaplan::knowledge::RobotReport;
 use metaplan::mapek::{Answer, Command, Loop, Observation, Settings};
 use metaplan::setup::Setup;
-use ontology::tomasys::change::Status;
 use serde_json::json;
 
-use crate::common::{control, feed};
+use crate::common::feed;
 
 /// Rule that counts without end while the first component has failed.
 const RUNAWAY: &str = "@prefix : <http://example.org/m#> .\n@prefix t: <http://metacontrol.org/tomasys#> .\n\
@@ -157,20 +155,4 @@ fn a_reported_value_replaces_that_of_another_version() {
     next.migrate(&robot, &tame).expect("no action is under way");
     assert_eq!(light(&next)["light"].as_deref(), Some("7/10"));
     assert_eq!(light(&next)["depth"].as_deref(), Some("3/5"), "the robot has not reported it");
-}
-
-/// After a migration, objectives that wait for inference can have names that the new version lacks.
-#[test]
-fn a_report_is_applied_despite_unknown_pending_objectives() {
-    let control = control("ugv");
-    let mut knowledge = control.beliefs().mission().knowledge().expect("a knowledge base").clone();
-    let failed = || RobotReport::Component(Status::Failed);
-    knowledge.limit(1);
-    knowledge.take("c_kinect", failed()).expect("the component is known");
-    assert!(knowledge.fault().is_some());
-    let objectives = [("f_nothing".to_owned(), "fd_nothing".to_owned())];
-    knowledge.pursue_in_time(&objectives).expect("the objectives wait");
-    knowledge.limit(1_000_000);
-    let delta = knowledge.take("c_lidar", failed()).expect("the report is applied");
-    assert!(!delta.insert.is_empty() && knowledge.fault().is_none());
 }
