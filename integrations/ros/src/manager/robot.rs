@@ -247,8 +247,9 @@ impl Robot {
                         procedure::Outcome::Failed(because) => Outcome::StepFailed(because),
                         procedure::Outcome::Silent(because) => Outcome::Failed(because),
                     };
-                    let outcome = if procedures.is_in_no_mode(&change.function) {
-                        Outcome::NotUndone(Box::new(outcome))
+                    let has_failed = outcome != Outcome::Done;
+                    let outcome = if has_failed && procedures.is_in_no_mode(&change.function) {
+                        Outcome::NoMode(Box::new(outcome))
                     } else {
                         outcome
                     };
@@ -375,12 +376,18 @@ impl Robot {
         let task = smol::spawn(async move {
             let mut reports = Reports::default();
             loop {
-                let input = match events.next().await {
-                    Progress::Feedback { completion, .. } => {
-                        let Some(fraction) = reports.fraction(completion, Instant::now()) else { continue };
-                        Input::Progress(number, fraction)
+                let due = reports.due();
+                let timer = async {
+                    match due {
+                        Some(due) => _ = Timer::at(due).await,
+                        None => futures::future::pending().await,
                     }
-                    Progress::Ended(end) => {
+                    None
+                };
+                let completion = match smol::future::or(async { Some(events.next().await) }, timer).await {
+                    Some(Progress::Feedback { completion, .. }) => completion,
+                    None => None,
+                    Some(Progress::Ended(end)) => {
                         let ended = match end {
                             End::Succeeded => Ended::Succeeded,
                             End::Canceled => Ended::Cancelled,
@@ -390,7 +397,9 @@ impl Robot {
                         return;
                     }
                 };
-                let _ = inputs.send(input);
+                if let Some(fraction) = reports.fraction(completion, Instant::now()) {
+                    let _ = inputs.send(Input::Progress(number, fraction));
+                }
             }
         });
         self.performing.retain(|_, (_, task)| !task.is_finished());
@@ -403,6 +412,16 @@ impl Robot {
             Some((running, _)) => running.cancel(),
             None => drop(self.inputs.send(Input::Performed(number, Ended::Cancelled))),
         }
+    }
+
+    /// Reports after a real time that an action should have ended. Simulated time may be paused.
+    pub(super) fn await_end(&self, number: u64, time: Duration) {
+        let inputs = self.inputs.clone();
+        smol::spawn(async move {
+            Timer::after(time).await;
+            let _ = inputs.send(Input::Overdue(number));
+        })
+        .detach();
     }
 
     pub(super) fn plan(&self, plan: &Value) {
@@ -452,6 +471,12 @@ impl Reports {
             self.last = Some((share, now));
             share / 100.0
         })
+    }
+
+    /// Returns the time at which the last known share must be reported, if it was not reported at once.
+    fn due(&self) -> Option<Instant> {
+        let (last, since) = self.last?;
+        self.share.filter(|share| (share - last).abs() >= 0.5).map(|_| since + CHANGE_PERIOD)
     }
 }
 
@@ -569,12 +594,14 @@ mod tests {
             assert!(shares.is_sorted(), "{shares:?}");
             assert!((shares[shares.len() - 1] - f64::from(last_share)).abs() < 0.015, "{shares:?}");
         }
-        // A share that was not reported at once is repeated.
+        // A share that was not reported at once is reported later, even without further feedback.
         let mut reports = Reports::default();
-        let mut at =
-            |millis: u64, completion| reports.fraction(completion, start + Duration::from_millis(millis));
-        assert_eq!(at(0, Some(0.1)), Some(0.1));
-        assert_eq!(at(10, Some(0.257)), None);
-        assert_eq!(at(100, None), Some(0.26));
+        let at = |millis| start + Duration::from_millis(millis);
+        assert_eq!(reports.fraction(Some(0.1), at(0)), Some(0.1));
+        assert_eq!(reports.due(), None);
+        assert_eq!(reports.fraction(Some(0.257), at(10)), None);
+        assert_eq!(reports.due(), Some(at(100)));
+        assert_eq!(reports.fraction(None, at(100)), Some(0.26));
+        assert_eq!(reports.due(), None);
     }
 }

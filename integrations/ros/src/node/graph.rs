@@ -361,14 +361,18 @@ impl Graph {
     }
 
     /// Returns the GUIDs of the request readers of a service's servers. A reader whose participant has no reply writer
-    /// is no server.
+    /// is no server, and so is one of another type.
     pub(crate) fn servers(&self, topics: &Topics) -> BTreeSet<[u8; 16]> {
         let mut servers = self.readers(&topics.requests);
         let state = self.state();
         let is_writer = |endpoint: &Endpoint| !endpoint.is_reader && endpoint.topic == topics.replies;
         let writers = state.endpoints.iter().filter(|(_, endpoint)| is_writer(endpoint));
         let participants: BTreeSet<&[u8]> = writers.map(|(guid, _)| &guid[..12]).collect();
-        servers.retain(|guid| participants.contains(&guid[..12]));
+        let has_type = |guid: &[u8; 16]| {
+            let types = state.endpoints.get(guid).zip(state.expected.get(&topics.requests));
+            types.is_none_or(|(endpoint, expected)| endpoint.wrong_type(expected).is_none())
+        };
+        servers.retain(|guid| participants.contains(&guid[..12]) && has_type(guid));
         servers
     }
 

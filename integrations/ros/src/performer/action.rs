@@ -5,19 +5,24 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures::FutureExt as _;
+use smol::Timer;
 
-use crate::interfaces::Action;
 use crate::interfaces::suave_msgs::action::{
     FollowPipeline, FollowPipelineFeedback, FollowPipelineGoal, FollowPipelineResult, RechargeBattery,
     RechargeBatteryFeedback, RechargeBatteryGoal, RechargeBatteryResult, RecoverThrusters,
     RecoverThrustersFeedback, RecoverThrustersGoal, RecoverThrustersResult, SpiralSearch,
     SpiralSearchFeedback, SpiralSearchGoal, SpiralSearchResult,
 };
-use crate::node::{Accepted, ActionCaller, GoalEnd, Node, Pursued};
+use crate::interfaces::{Action, Service};
+use crate::node::{Accepted, ActionCaller, CallError, Caller, GoalEnd, Node, Pursued};
 use crate::perform::{Call, End, Perform, Performance, Progress, Running};
 use crate::performer::{feedback, part};
 
-pub(super) const SERVER_TIMEOUT: Duration = Duration::from_secs(10);
+const SERVER_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Time to wait for the answer to a goal whose action is cancelled. A goal that is accepted later is cancelled, too, but
+/// its end is not awaited.
+const CANCELED_WAIT: Duration = Duration::from_secs(1);
 
 /// Mapping of an action of a plan to goals, feedback and results of a ROS action.
 pub(super) trait Meaning: Action + Sized + 'static {
@@ -75,11 +80,52 @@ async fn follow<A: Meaning>(
     call: &Call,
     performance: &Performance,
 ) -> End {
-    let pursued = match caller.pursue(goal, SERVER_TIMEOUT).await {
+    let pursued = match send(caller, goal, performance).await {
         Ok(pursued) => pursued,
-        Err(error) => return End::Failed(error.to_string()),
+        Err(end) => return end,
     };
     pursue_on(&pursued, performance, |message| A::progress(call, message), A::shortfall).await
+}
+
+/// Sends a goal, and waits until the server accepts it. If the action is cancelled meanwhile, the goal is cancelled.
+pub(super) async fn send<A: Action + 'static>(
+    caller: &ActionCaller<A>,
+    goal: A::Goal,
+    performance: &Performance,
+) -> Result<Pursued<A>, End> {
+    let mut pursuit = Box::pin(caller.pursue(goal, SERVER_TIMEOUT));
+    let canceled = async {
+        performance.canceled().await;
+        None
+    };
+    let answer = smol::future::or(async { Some(pursuit.as_mut().await) }, canceled).await;
+    if let Some(answer) = answer {
+        return answer.map_err(|error| End::Failed(error.to_string()));
+    }
+    // A goal that was sent already may be accepted, and the robot then needs its designs until the goal has ended.
+    let late = async {
+        Timer::after(CANCELED_WAIT).await;
+        None
+    };
+    let pursued = smol::future::or(async { pursuit.await.ok() }, late).await.ok_or(End::Canceled)?;
+    pursued.cancel();
+    Ok(pursued)
+}
+
+/// Calls a service. The action can be cancelled while the service has no server.
+pub(super) async fn call<S: Service>(
+    caller: &Caller<S>,
+    request: S::Request,
+    performance: &Performance,
+) -> Result<S::Response, End> {
+    let canceled = async {
+        performance.canceled().await;
+        Err(End::Canceled)
+    };
+    let failed = |error: CallError| End::Failed(error.to_string());
+    let ready = async { caller.ready(SERVER_TIMEOUT).await.map_err(failed) };
+    smol::future::or(ready, canceled).await?;
+    caller.call(request, SERVER_TIMEOUT).await.map_err(failed)
 }
 
 /// Forwards the progress of an accepted goal until the goal ends, and cancels the goal on request.

@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use crate::interfaces::geometry_msgs::msg::PoseStamped;
 use crate::node::{ActionCaller, Caller, Node, valid_name};
 use crate::perform::{Call, End, Perform, Running};
-use crate::performer::action::{SERVER_TIMEOUT, pursue_on};
+use crate::performer::action::{self, pursue_on, send};
 use crate::performer::settings::argument;
 use crate::performer::{Poses, feedback};
 use crate::types::{ActionType, Answer, AnyAction, AnyService, Expectation, Library, Raw, ServiceType};
@@ -213,11 +213,11 @@ impl Perform for GoalClient {
                 smol::spawn(async move {
                     let shortfall =
                         |Raw(result): &Raw| expected.check(&kind.result, result, STATUS_LENGTH).err();
-                    let end = match caller.pursue(Raw(goal), SERVER_TIMEOUT).await {
+                    let end = match send(&caller, Raw(goal), &performance).await {
                         Ok(pursued) => {
                             pursue_on(&pursued, &performance, |_| feedback(None, "running"), shortfall).await
                         }
-                        Err(error) => End::Failed(error.to_string()),
+                        Err(end) => end,
                     };
                     performance.end(end);
                 })
@@ -252,14 +252,14 @@ impl Perform for CallClient {
         match encoded {
             Ok(request) => {
                 smol::spawn(async move {
-                    let end = match caller.call(Raw(request), SERVER_TIMEOUT).await {
+                    let end = match action::call(&caller, Raw(request), &performance).await {
                         Ok(Raw(reply)) => match answer.check(&kind, &reply) {
                             Ok(()) => End::Succeeded,
                             Err(because) => {
                                 End::Failed(format!("{} has refused: {because}", caller.service()))
                             }
                         },
-                        Err(error) => End::Failed(error.to_string()),
+                        Err(end) => end,
                     };
                     performance.end(end);
                 })

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::interfaces::system_modes_msgs::srv::{ChangeMode as Service, ChangeModeRequest};
 use crate::node::{Caller, Node};
 use crate::perform::{Call, End, Perform, Running};
-use crate::performer::action::SERVER_TIMEOUT;
+use crate::performer::action;
 use crate::performer::settings::argument;
 
 /// Performer that executes an action by a call of `change_mode`. The fields `function` and `design` are the positions
@@ -50,10 +50,10 @@ impl Perform for ChangeMode {
                 let caller = self.caller(function);
                 let request = ChangeModeRequest { mode_name: design.to_owned() };
                 smol::spawn(async move {
-                    let end = match caller.call(request, SERVER_TIMEOUT).await {
+                    let end = match action::call(&caller, request, &performance).await {
                         Ok(answer) if answer.success => End::Succeeded,
                         Ok(_) => End::Failed(format!("{} has refused it", caller.service())),
-                        Err(error) => End::Failed(error.to_string()),
+                        Err(end) => end,
                     };
                     performance.end(end);
                 })

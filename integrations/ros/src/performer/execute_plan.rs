@@ -9,8 +9,8 @@ use crate::interfaces::plansys2_1::plansys2_msgs::action as older;
 use crate::interfaces::plansys2_msgs::action as newer;
 use crate::interfaces::plansys2_msgs::msg::{ActionExecutionInfo, Plan};
 use crate::node::{ActionCaller, Node};
-use crate::perform::{End, Progress, Running};
-use crate::performer::action::{SERVER_TIMEOUT, pursue_on};
+use crate::perform::{Progress, Running};
+use crate::performer::action::{pursue_on, send};
 use crate::performer::{feedback, part};
 
 /// Versions of PlanSys2 with different executors.
@@ -53,7 +53,7 @@ impl ExecutePlans {
             Caller::Older(caller) => {
                 let caller = Arc::clone(caller);
                 smol::spawn(async move {
-                    let end = match caller.pursue(older::ExecutePlanGoal::default(), SERVER_TIMEOUT).await {
+                    let end = match send(&caller, older::ExecutePlanGoal::default(), &performance).await {
                         Ok(pursued) => {
                             pursue_on(&pursued, &performance, progress_older, |result| {
                                 let because = || format!("PlanSys2 has failed: {}", result.error_info);
@@ -61,7 +61,7 @@ impl ExecutePlans {
                             })
                             .await
                         }
-                        Err(error) => End::Failed(error.to_string()),
+                        Err(end) => end,
                     };
                     performance.end(end);
                 })
@@ -70,7 +70,7 @@ impl ExecutePlans {
             Caller::Newer(caller) => {
                 let caller = Arc::clone(caller);
                 smol::spawn(async move {
-                    let end = match caller.pursue(newer::ExecutePlanGoal { plan }, SERVER_TIMEOUT).await {
+                    let end = match send(&caller, newer::ExecutePlanGoal { plan }, &performance).await {
                         Ok(pursued) => {
                             pursue_on(
                                 &pursued,
@@ -83,7 +83,7 @@ impl ExecutePlans {
                             )
                             .await
                         }
-                        Err(error) => End::Failed(error.to_string()),
+                        Err(end) => end,
                     };
                     performance.end(end);
                 })

@@ -350,38 +350,42 @@ impl Clients {
         Ok(present)
     }
 
-    /// Sets parameters atomically and checks the values afterwards. Passes the earlier values to `before`.
-    /// Sets nothing if the node already has the values.
+    /// Sets parameters atomically and checks the values afterwards. Passes the earlier values to `note`, unless the node
+    /// refuses the request. Sets nothing if the node already has the values.
     pub(super) async fn set(
         &self,
         node: &str,
         values: &[(String, ParameterValue)],
         deadline: Instant,
-        before: impl FnOnce(Vec<(String, ParameterValue)>),
+        note: impl FnOnce(Vec<(String, ParameterValue)>),
     ) -> Result<(), Failure> {
         let present = self.parameters(node, values, remaining(deadline)).await?;
         let values_to_set = fitted(values, &present);
-        if values_to_set == present {
+        if equal(&values_to_set, &present) {
             return Ok(());
         }
-        before(values.iter().map(|(name, _)| name.clone()).zip(present).collect());
+        let earlier = values.iter().map(|(name, _)| name.clone()).zip(present).collect();
         let parameters = values
             .iter()
             .zip(&values_to_set)
             .map(|((name, _), value)| msg::Parameter { name: name.clone(), value: raw(value.clone()) })
             .collect();
         let request = SetParametersAtomicallyRequest { parameters };
-        let answer = self.node(node)?.set_parameters.call(request, remaining(deadline)).await?;
-        if !answer.result.successful {
-            let reason = answer.result.reason;
+        let answer = self.node(node)?.set_parameters.call(request, remaining(deadline)).await;
+        // A refused request has no effect, because it is atomic.
+        if let Ok(answer) = &answer
+            && !answer.result.successful
+        {
+            let reason = &answer.result.reason;
             return Err(Failure::Refused(format!("{node} has refused the parameters: {reason}")));
         }
+        note(earlier);
+        answer?;
         let present = self.parameters(node, values, remaining(deadline)).await?;
-        let differs = values
-            .iter()
-            .zip(&values_to_set)
-            .zip(&present)
-            .find(|((_, values_to_set), present)| values_to_set != present);
+        let differs =
+            values.iter().zip(&values_to_set).zip(&present).find(|((_, value), present)| {
+                !equal(std::slice::from_ref(value), std::slice::from_ref(present))
+            });
         match differs {
             None => Ok(()),
             Some((((name, _), values_to_set), present)) => Err(Failure::Refused(format!(
@@ -392,15 +396,28 @@ impl Clients {
         }
     }
 
+    fn service(&self, service: &str, call: &ServiceCall) -> Result<&Caller<AnyService>, Failure> {
+        let client = self.services.get(&service_key(service, call));
+        client.ok_or_else(|| Failure::Refused(format!("{service} has no client")))
+    }
+
+    /// Waits for the server of a service, and connects to it.
+    pub(super) async fn ready(
+        &self,
+        service: &str,
+        call: &ServiceCall,
+        within: Duration,
+    ) -> Result<(), Failure> {
+        Ok(self.service(service, call)?.ready(within).await?)
+    }
+
     pub(super) async fn call(
         &self,
         service: &str,
         call: &ServiceCall,
         within: Duration,
     ) -> Result<(), Failure> {
-        let client = self.services.get(&service_key(service, call));
-        let client = client.ok_or_else(|| Failure::Refused(format!("{service} has no client")))?;
-        let Raw(answer) = client.call(Raw(call.request.clone()), within).await?;
+        let Raw(answer) = self.service(service, call)?.call(Raw(call.request.clone()), within).await?;
         call.check(&answer).map_err(|because| Failure::Refused(format!("{service} has refused: {because}")))
     }
 
@@ -471,7 +488,7 @@ impl Clients {
             }
             Condition::Parameters { node, values } => {
                 let present = self.parameters(node, values, OBSERVATION_TIMEOUT).await?;
-                Ok(fitted(values, &present) == present)
+                Ok(equal(&fitted(values, &present), &present))
             }
             Condition::Topic(_) | Condition::Published(_) | Condition::Message { .. } => {
                 Ok(self.is_met(condition))
@@ -508,8 +525,13 @@ impl Clients {
     }
 }
 
-/// Executes a program, and kills it at the deadline. Its output goes to standard error.
-pub(super) async fn execute(words: &[String], deadline: Instant) -> Result<(), Failure> {
+/// Executes a program, and kills it at the deadline. Calls `before` once the program is started. Its output goes to
+/// standard error.
+pub(super) async fn execute(
+    words: &[String],
+    deadline: Instant,
+    before: impl FnOnce(),
+) -> Result<(), Failure> {
     let [program, arguments @ ..] = words else { return Ok(()) };
     let child = smol::process::Command::new(program)
         .args(arguments)
@@ -519,6 +541,7 @@ pub(super) async fn execute(words: &[String], deadline: Instant) -> Result<(), F
         .spawn();
     let mut child =
         child.map_err(|error| Failure::Refused(format!("`{program}` cannot be started: {error}")))?;
+    before();
     let ended = async { Some(child.status().await) };
     let late = async {
         Timer::at(deadline).await;
@@ -541,6 +564,11 @@ fn fitted(values: &[(String, ParameterValue)], present: &[ParameterValue]) -> Ve
     values.iter().zip(present).map(fit).collect()
 }
 
+/// Returns `true` if two lists of values are equal. NaN is equal to NaN, which `==` denies.
+fn equal(values: &[ParameterValue], present: &[ParameterValue]) -> bool {
+    values == present || format!("{values:?}") == format!("{present:?}")
+}
+
 fn text(value: &ParameterValue) -> String {
     match value {
         ParameterValue::NotSet => "no value".to_owned(),
@@ -556,7 +584,21 @@ fn text(value: &ParameterValue) -> String {
 mod tests {
     use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-    use super::LastMessage;
+    use ros2_client::ParameterValue;
+
+    use super::{LastMessage, equal};
+
+    #[test]
+    fn parameters_are_equal_if_both_are_not_a_number() {
+        let list = |value: f64| vec![ParameterValue::Double(value), ParameterValue::DoubleArray(vec![value])];
+        for (value, present) in [(f64::NAN, f64::NAN), (0.0, -0.0), (1.5, 1.5)] {
+            assert!(equal(&list(value), &list(present)), "{value}");
+        }
+        for (value, present) in [(f64::NAN, 1.0), (1.5, 1.25), (1.0, -1.0)] {
+            assert!(!equal(&list(value), &list(present)), "{value}");
+        }
+        assert!(!equal(&[ParameterValue::Integer(1)], &[ParameterValue::Double(1.0)]));
+    }
 
     /// Checks the last message of a sequence. For each message: the seconds since the start, the difference of our clock
     /// from the time since the start, the seconds of the publication by the clock of the publisher (`None` for a message

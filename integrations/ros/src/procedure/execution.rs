@@ -351,7 +351,10 @@ impl Run<'_> {
                 clients.set(node, values, deadline, note).await
             }
             Operation::Service { service, call } => {
+                // Without a server nothing is sent, so that nothing must be undone.
+                clients.ready(service, call, within).await?;
                 undos.push(undo_of(operation, undo));
+                let within = deadline.saturating_duration_since(Instant::now());
                 clients.call(service, call, within).await
             }
             Operation::Publish { message, subscribers } => {
@@ -367,18 +370,13 @@ impl Run<'_> {
                 clients.publish(message, *subscribers, within, note).await
             }
             Operation::Command(words) => {
-                undos.push(undo_of(operation, undo));
-                execute(words, deadline).await
+                execute(words, deadline, || undos.push(undo_of(operation, undo))).await
             }
         };
-        // A refused operation counts as without effect, so its undo is dropped. There are two exceptions: parameters may
-        // have been accepted with other values, and a program can fail after a part of its effect. Without an answer,
-        // the effect is unknown, and the undo is kept.
-        if matches!(outcome, Err(Failure::Refused(_))) {
-            let undone = undos.split_off(count);
-            if matches!(operation, Operation::Parameters { .. } | Operation::Command(_)) {
-                undos.extend(undone.into_iter().filter(|undo| matches!(undo, Undo::Operation(_))));
-            }
+        // A refused service call counts as without effect, so its undo is dropped. Without an answer, the effect is unknown,
+        // and the undo is kept, as for a program, which can fail after a part of its effect.
+        if matches!((operation, &outcome), (Operation::Service { .. }, Err(Failure::Refused(_)))) {
+            undos.truncate(count);
         }
         outcome
     }
@@ -444,12 +442,12 @@ mod tests {
     const FUNCTION: &str = "f_grip";
 
     /// Steps of the designs of a gripper, and the mode in which their failure leaves a gripper with a vacuum.
-    const DESIGNS: [(&str, &str, Option<&str>); 6] = [
+    const DESIGNS: [(&str, &str, Option<&str>); 8] = [
         ("fd_vacuum", r#"[{ command = ["true"] }]"#, None),
         ("fd_magnet", r#"[{ command = ["true"] }, { command = ["false"] }]"#, Some("")),
         (
             "fd_clamp",
-            r#"[{ command = ["true"], undo = { command = ["true"] } }, { command = ["false"] }]"#,
+            r#"[{ command = ["true"], undo = { command = ["true"] } }, { command = ["/no/such/program"] }]"#,
             Some("fd_vacuum"),
         ),
         (
@@ -457,8 +455,16 @@ mod tests {
             r#"[{ command = ["true"], undo = { command = ["false"] } }, { command = ["false"] }]"#,
             Some(""),
         ),
-        ("fd_glue", r#"[{ command = ["false"] }]"#, Some("fd_vacuum")),
-        ("fd_rope", r#"[{ command = ["true"] }, { command = ["sleep", "9"] }]"#, Some("")),
+        // A program may fail after a part of its effect, but not if it was not started.
+        ("fd_glue", r#"[{ command = ["false"] }]"#, Some("")),
+        ("fd_tape", r#"[{ command = ["/no/such/program"] }]"#, Some("fd_vacuum")),
+        (
+            "fd_rope",
+            r#"[{ command = ["true"], undo = { command = ["true"] } }, { command = ["sleep", "9"] }]"#,
+            Some(""),
+        ),
+        // The service has no server, so that nothing is sent.
+        ("fd_claw", r#"[{ service = "/claw", type = "std_srvs/srv/Trigger" }]"#, Some("fd_vacuum")),
     ];
 
     fn procedures() -> Procedures {

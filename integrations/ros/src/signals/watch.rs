@@ -36,9 +36,13 @@ const STATE_TIMEOUT: Duration = Duration::from_secs(2);
 /// Period of the queries of a lifecycle node's state. They correct lost transition events.
 const STATE_PERIOD: Duration = Duration::from_secs(5);
 
-/// Number of successive queries without a valid answer after which a lifecycle node has failed. The first query may
-/// be lost before the server has discovered this node.
+/// Number of successive queries without a valid answer after which a lifecycle node with a new server has failed. The
+/// first query may be lost before the server has discovered this node.
 const MAX_UNANSWERED: u32 = 2;
+
+/// Number of successive queries without a valid answer after which a lifecycle node has failed whose server has answered
+/// before (about 14 s). A node with one thread does not answer while it works in a callback.
+const MAX_UNANSWERED_LATER: u32 = 6;
 
 /// Receives the index of a signal and its status.
 pub(crate) type Report = Arc<dyn Fn(usize, DiagnosticStatus) + Send + Sync>;
@@ -308,7 +312,8 @@ impl StateQueries {
             return answer;
         }
         self.unanswered += 1;
-        (self.unanswered >= MAX_UNANSWERED).then_some(false)
+        let limit = if self.servers == servers { MAX_UNANSWERED_LATER } else { MAX_UNANSWERED };
+        (self.unanswered >= limit).then_some(false)
     }
 }
 
@@ -351,10 +356,10 @@ fn watch_state(
                 let event_count = events.load(Ordering::Relaxed);
                 let answer = service.call(GetStateRequest::default(), STATE_TIMEOUT).await;
                 let answer = answer.ok().map(|answer| PrimaryState::of(&answer.current_state) == Some(state));
-                // An event during the query may be newer than the answer, which is then ignored.
-                if events.load(Ordering::Relaxed) == event_count
-                    && let Some(works) = queries.note(servers, answer, Instant::now())
-                {
+                // An event during the query shows that the node works, and may be newer than the answer, which is ignored.
+                if events.load(Ordering::Relaxed) != event_count {
+                    queries.unanswered = 0;
+                } else if let Some(works) = queries.note(servers, answer, Instant::now()) {
                     reporter.works(works);
                 }
             }
@@ -417,13 +422,31 @@ mod tests {
         assert!(!queries.is_due(&first, at(7)));
         assert!(queries.is_due(&first, at(8)), "an event may be lost");
         assert_eq!(queries.note(first.clone(), Some(false), at(8)), Some(false));
-        assert_eq!(queries.note(first, Some(true), at(13)), Some(true));
+        assert_eq!(queries.note(first.clone(), Some(true), at(13)), Some(true));
+        // The node works in a callback for ten seconds, and stops later.
+        for (seconds, answer, expected) in [
+            (20, None, None),
+            (22, None, None),
+            (24, None, None),
+            (26, None, None),
+            (28, Some(true), Some(true)),
+            (35, None, None),
+            (37, None, None),
+            (39, None, None),
+            (41, None, None),
+            (43, None, None),
+            (45, None, Some(false)),
+        ] {
+            assert!(queries.is_due(&first, at(seconds)));
+            assert_eq!(queries.note(first.clone(), answer, at(seconds)), expected, "{seconds}");
+        }
+        assert_eq!(queries.note(first, Some(true), at(46)), Some(true));
         // The node has been started again and does not answer.
-        for (seconds, expected) in [(14, None), (16, Some(false)), (18, Some(false))] {
+        for (seconds, expected) in [(47, None), (49, Some(false)), (51, Some(false))] {
             assert!(queries.is_due(&second, at(seconds)));
             assert_eq!(queries.note(second.clone(), None, at(seconds)), expected);
         }
-        assert_eq!(queries.note(second, Some(true), at(20)), Some(true));
+        assert_eq!(queries.note(second, Some(true), at(53)), Some(true));
     }
 
     #[test]

@@ -171,13 +171,20 @@ fn a_goal_that_is_accepted_late_is_cancelled() {
         (caller, first.expect("accepted"), second.expect_err("no answer").to_string())
     });
     let Some(GoalEvent::Wanted(request, _)) = next(&events) else { panic!("a goal is wanted") };
-    goals.accept(request);
+    let accepted = goals.accept(request);
     let Some(GoalEvent::Wanted(request, _)) = next(&events) else { panic!("a goal is wanted") };
-    let (_caller, _first, error) = pursuing.join().expect("no panic");
+    let (_caller, first, error) = pursuing.join().expect("no panic");
     assert!(error.contains("no answer to a goal after 0.5 s"), "{error}");
     let late = goals.accept(request);
     let Some(GoalEvent::Cancel(goal, _)) = next(&events) else { panic!("a goal is to be cancelled") };
     assert_eq!(goal, late);
+    // A goal whose handle is dropped is cancelled, too. The late goal may be cancelled twice.
+    drop(first);
+    let mut cancelled = std::iter::from_fn(|| match next(&events) {
+        Some(GoalEvent::Cancel(goal, _)) => Some(goal),
+        _ => None,
+    });
+    assert_eq!(cancelled.find(|goal| *goal != late), Some(accepted));
 }
 
 #[test]

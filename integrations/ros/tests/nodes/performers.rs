@@ -163,6 +163,16 @@ fn nav2_moves_the_robot() {
 }
 
 #[test]
+fn an_action_without_a_server_is_cancelled_soon() {
+    let (_manager, cast) = cast(domain(), SETTINGS);
+    for text in ["(move r1 kitchen hall)", "(reconfigure f_search fd_high)"] {
+        let running = cast.start(call(text));
+        running.cancel();
+        assert_eq!(hear(&running).1, End::Canceled, "{text}");
+    }
+}
+
+#[test]
 fn a_result_of_another_version_ends_the_action() {
     use humble::nav2_msgs::action::{NavigateToPose, NavigateToPoseFeedback, NavigateToPoseResult};
 

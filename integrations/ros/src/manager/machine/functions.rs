@@ -113,7 +113,7 @@ impl Machine {
                 self.failed(&function, effect, Some(self.now + REFUSED_RETRY_DELAY));
                 because
             }
-            Outcome::NotUndone(outcome) => {
+            Outcome::NoMode(outcome) => {
                 self.grants.remove(&function);
                 self.modes.insert(function.clone(), String::new());
                 // The failure is reported afterwards, so that the loop does not assume the previous design for its next
@@ -261,14 +261,12 @@ impl Machine {
         format!("{function} answers again")
     }
 
-    /// Abandons an action that has not ended in time after its task. Reports designs as realisable again once their
-    /// retry delay is over. Removes grants once their period is over; if another mode was reported in the meantime,
+    /// Reports designs as realisable again once their retry delay is over. Removes grants once their period is over; if another mode was reported in the meantime,
     /// requests the current mode of the function. In the states EXECUTE and DEGRADED, also passes a due tick to the
     /// loop: the filters of the loop delay the report that a component works again until a later line, and an unchanged
     /// status produces no line.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
-        self.abandon_action();
         let mut back = Vec::new();
         for failures in self.failures.values_mut() {
             let due = |again: &Option<Duration>| again.is_some_and(|again| again <= now);

@@ -33,6 +33,8 @@ pub(in crate::manager) enum Input {
     /// A function without a reply was probed: `true` if it replies.
     Probed(String, bool),
     Autopilot(String),
+    /// The time to wait for the end of the action with this number is over.
+    Overdue(u64),
     Tick,
 }
 
@@ -55,8 +57,9 @@ pub(in crate::manager) enum Outcome {
     Failed(String),
     /// A step or condition has failed for this reason, and the earlier steps were undone as far as possible.
     StepFailed(String),
-    /// The outcome of steps that have failed and of which some were not undone: the function is in none of its modes.
-    NotUndone(Box<Outcome>),
+    /// The outcome of steps that have failed, after which the function is in none of its modes, usually because some steps
+    /// were not undone.
+    NoMode(Box<Outcome>),
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -76,6 +79,8 @@ pub(in crate::manager) enum Output {
     Reply(u64, bool),
     Perform(u64, Call),
     Stop(u64),
+    /// Report after a delay that the action with this number should have ended.
+    Await(u64, Duration),
     Plan(Value),
     Event(Value),
     Warn(String),

@@ -74,8 +74,8 @@ pub(super) struct Machine {
     modes: BTreeMap<String, String>,
     grants: BTreeMap<String, Grant>,
     action: Option<Action>,
-    /// Time until which the end of the task waits for the end of the action.
-    ending: Option<Duration>,
+    /// Number of the action for whose end the end of its task waits.
+    ending: Option<u64>,
     start_requests: Vec<u64>,
     end_requests: Vec<u64>,
     failures: BTreeMap<String, CallFailures>,
@@ -174,6 +174,7 @@ impl Machine {
             Input::Progress(number, fraction) => self.progress(number, fraction),
             Input::Probed(function, answers) => self.probed(&function, answers),
             Input::Autopilot(mode) => self.autopilot(&mode),
+            Input::Overdue(number) => self.abandon(number),
             Input::Tick | Input::Diagnosed => self.tick(),
         };
         self.settle()?;

@@ -12,7 +12,7 @@ use crate::manager::machine::{EMPTY_GOAL, Machine};
 use crate::manager::settings::fact_value;
 
 /// Time to wait for the end of the action of a task that has ended. Clients such as SUAVE's mission node wait five
-/// seconds for the reply.
+/// seconds for the reply, even if time is simulated.
 const STOP_WAIT: Duration = Duration::from_secs(3);
 
 impl Machine {
@@ -89,8 +89,11 @@ impl Machine {
             // The robot needs the functions until the performer reports the end.
             Some(action) => {
                 action.is_stopped = true;
-                self.outputs.push(Output::Stop(action.number));
-                self.ending.get_or_insert(self.now + STOP_WAIT);
+                let number = action.number;
+                self.outputs.push(Output::Stop(number));
+                if self.ending.replace(number).is_none() {
+                    self.outputs.push(Output::Await(number, STOP_WAIT));
+                }
             }
             None => self.end_action(),
         }
@@ -114,18 +117,18 @@ impl Machine {
     }
 
     /// Ends an action whose performer has not reported its end in time after the end of the task.
-    pub(super) fn abandon_action(&mut self) {
-        if self.ending.is_none_or(|until| until > self.now) {
-            return;
+    pub(super) fn abandon(&mut self, number: u64) -> String {
+        if self.ending != Some(number) {
+            return format!("action {number} is not awaited");
         }
-        for number in std::mem::take(&mut self.end_requests) {
-            self.outputs.push(Output::Reply(number, false));
+        for request in std::mem::take(&mut self.end_requests) {
+            self.outputs.push(Output::Reply(request, false));
         }
         let action = self.action.as_ref().map(|action| action.call.text()).unwrap_or_default();
-        self.outputs.push(Output::Warn(format!(
-            "{action} was cancelled, but its performer has not reported the end"
-        )));
+        let because = format!("{action} was cancelled, but its performer has not reported the end");
+        self.outputs.push(Output::Warn(because.clone()));
         self.end_action();
+        because
     }
 
     pub(super) fn reached(&mut self) {

@@ -14,6 +14,9 @@ const PATH: &str = "f_generate_search_path";
 const MOTION: &str = "f_maintain_motion";
 const RECHARGE: &str = "generate_recharge_path";
 
+/// Outputs that stop the first action when its task ends.
+const STOP: [Output; 2] = [Output::Stop(1), Output::Await(1, Duration::from_secs(3))];
+
 struct Robot {
     machine: Machine,
     now: Duration,
@@ -142,7 +145,7 @@ fn a_task_is_granted_when_its_functions_have_their_designs() {
     assert!(last.contains(&Output::Reply(7, true)), "{last:?}");
     assert_eq!(robot.machine.state(), State::Execute);
     // The end of the task withdraws all designs. The client receives the reply when this is done.
-    assert_eq!(robot.cancel("search_pipeline"), [Output::Stop(1)]);
+    assert_eq!(robot.cancel("search_pipeline"), STOP);
     let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     let outputs = robot.obey(outputs);
@@ -155,7 +158,7 @@ fn stopping(journal: Option<&Path>) -> Robot {
     let mut robot = Robot::new(journal);
     let outputs = robot.request("search_pipeline");
     assert_eq!(performed(&robot.obey(outputs)), ["search_pipeline"]);
-    assert_eq!(robot.cancel("search_pipeline"), [Output::Stop(1)]);
+    assert_eq!(robot.cancel("search_pipeline"), STOP);
     robot
 }
 
@@ -173,11 +176,14 @@ fn functions_keep_their_designs_until_the_action_of_a_cancelled_task_has_ended()
         assert_eq!(outputs, [Output::Reply(8, true)]);
         assert_eq!(robot.machine.state(), State::Idle);
     }
-    // The performer does not stop.
+    // The performer does not stop. Its time does not depend on that of the loop, which may be simulated.
     let mut robot = stopping(None);
-    robot.now += Duration::from_secs(3);
-    let outputs = robot.handle(Input::Tick);
-    assert_eq!(outputs[0], Output::Reply(8, false));
+    robot.now += Duration::from_secs(9);
+    assert_eq!(robot.handle(Input::Tick), []);
+    assert_eq!(robot.handle(Input::Overdue(0)), [], "an earlier action");
+    assert_eq!(robot.cancel("search_pipeline"), [Output::Stop(1)], "the time begins with the first request");
+    let outputs = robot.handle(Input::Overdue(1));
+    assert_eq!(outputs[..2], [Output::Reply(8, false), Output::Reply(8, false)]);
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     robot.obey(outputs);
     assert_eq!(robot.machine.state(), State::Idle);
@@ -189,8 +195,7 @@ fn a_new_task_waits_for_the_end_of_the_cancelled_action() {
     let mut robot = stopping(None);
     let outputs = robot.request("inspect_pipeline");
     assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
-    robot.now += Duration::from_secs(9);
-    let outputs = robot.handle(Input::Tick);
+    let outputs = robot.handle(Input::Overdue(1));
     assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
     let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
     assert_eq!(performed(&robot.obey(outputs)), ["inspect_pipeline"]);
@@ -405,7 +410,7 @@ fn a_task_ends_when_the_autopilot_no_longer_obeys() {
     robot.obey(outputs);
     assert_eq!(robot.handle(Input::Autopilot("GUIDED".to_owned())), []);
     let outputs = robot.handle(Input::Autopilot("MANUAL".to_owned()));
-    assert_eq!(outputs, [Output::Stop(1)]);
+    assert_eq!(outputs, STOP);
     let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     robot.obey(outputs);
@@ -660,7 +665,7 @@ fn a_design_is_requested_again_after_steps_that_were_not_undone() {
         let outputs = robot.handle(Input::Tick);
         assert_eq!(changes(&outputs), [(PATH, "fd_spiral_high")]);
         let high = outputs.iter().find(|output| is_path(output)).expect("a change").clone();
-        let outcome = if is_undone { failed() } else { Outcome::NotUndone(Box::new(failed())) };
+        let outcome = if is_undone { failed() } else { Outcome::NoMode(Box::new(failed())) };
         let outputs = robot.answer(&high, outcome);
         assert_eq!(changes(&outputs), expected);
         assert_eq!(robot.machine.state(), if is_undone { State::Execute } else { State::Reconfigure });

@@ -29,8 +29,12 @@ const LOOKUP_INTERVAL: Duration = Duration::from_millis(100);
 /// Time for which the server of a goal is missing, or another server is present, after which the goal counts as lost.
 const SERVER_LOSS_TIME: Duration = Duration::from_millis(500);
 
-/// Time to wait for the result of a goal that has ended according to its server.
+/// Time to wait for the result of a goal that the server does not know, or whose result was probably malformed.
 const RESULT_WAIT: Duration = Duration::from_secs(3);
+
+/// Time to wait for the result of a goal that has ended according to its server. Servers of `rclpy` report the end at
+/// once, but send the result only when the callback of the goal returns.
+const LATE_RESULT_WAIT: Duration = Duration::from_secs(10 * 60);
 
 /// Time for which a late acceptance of a goal is expected, so that the goal can be cancelled.
 const LATE_ANSWER_WAIT: Duration = Duration::from_secs(15 * 60);
@@ -113,8 +117,10 @@ struct Prospect {
     servers: BTreeSet<[u8; 16]>,
     /// Time since which these servers are missing, or another server is present.
     changed: Option<Instant>,
-    /// Time since which the goal has ended according to its status, or is unknown to the server.
+    /// Time since which the goal has ended according to its server.
     ended: Option<Instant>,
+    /// Time since which the server does not know the goal.
+    unknown: Option<Instant>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,23 +131,25 @@ enum Loss {
 
 impl Prospect {
     /// Returns the reason why the result can no longer be expected, if there is one. `servers` are the present servers.
+    /// `is_malformed` is `true` if a result could not be decoded, perhaps that of this goal.
     ///
     /// A new server replaces one that has crashed and whose endpoints remain until their lease expires. It does not
     /// have the goals of the other one.
-    fn loss(&mut self, servers: &BTreeSet<[u8; 16]>, now: Instant) -> Option<Loss> {
+    fn loss(&mut self, servers: &BTreeSet<[u8; 16]>, is_malformed: bool, now: Instant) -> Option<Loss> {
         let is_changed = servers.is_empty() || !servers.is_subset(&self.servers);
         self.changed = is_changed.then(|| self.changed.unwrap_or(now));
         let is_over = |since: Option<Instant>, limit: Duration| {
             since.is_some_and(|since| now.saturating_duration_since(since) >= limit)
         };
-        if is_over(self.ended, RESULT_WAIT) {
+        let result_wait = if is_malformed { RESULT_WAIT } else { LATE_RESULT_WAIT };
+        if is_over(self.unknown, RESULT_WAIT) || is_over(self.ended, result_wait) {
             return Some(Loss::Result);
         }
         is_over(self.changed, SERVER_LOSS_TIME).then_some(Loss::Server)
     }
 }
 
-/// A goal that an action server has accepted.
+/// A goal that an action server has accepted. The goal is cancelled if this handle is dropped.
 #[derive(Debug)]
 pub struct Pursued<A: Action> {
     goal: GoalId,
@@ -198,7 +206,10 @@ impl<A: Action + 'static> ActionCaller<A> {
         // The server may have accepted the goal, and the robot would then move on its own. Answers that are received from
         // here on are late.
         drop(answer);
+        // Under the lock, because the client library may give concurrent requests the same number.
+        let goals = connection.goals();
         let _ = connection.client.cancel_goal(goal);
+        drop(goals);
         let mapping = connection.server.mapping;
         Err(unreachable(format!(
             "no answer to a goal after {:.1} s; it was sent with the service mapping of {mapping}; `--rmw {}` selects \
@@ -305,7 +316,7 @@ impl<A: Action + 'static> Connection<A> {
                 let _ = self.client.cancel_goal(goal);
                 continue;
             };
-            let prospect = Prospect { servers: servers(), changed: None, ended: None };
+            let prospect = Prospect { servers: servers(), changed: None, ended: None, unknown: None };
             let followed = Followed { result, events, cancelled, cancel: None, prospect };
             goals.accepted.insert(goal, followed);
         }
@@ -317,7 +328,7 @@ impl<A: Action + 'static> Connection<A> {
         let ClientGoals { unanswered, accepted, malformed } = &mut *goals;
         unanswered.retain(|unanswered| unanswered.since.elapsed() < LATE_ANSWER_WAIT);
         accepted.retain(|goal, followed| {
-            let because = match followed.prospect.loss(servers, now) {
+            let because = match followed.prospect.loss(servers, malformed.is_some(), now) {
                 None => return true,
                 Some(Loss::Server) => format!("the server of {full} is gone"),
                 Some(Loss::Result) => match malformed {
@@ -367,7 +378,8 @@ impl<A: Action + 'static> Connection<A> {
             goals.note_cancellation(request, response.return_code);
         }
         for (goal, followed) in &mut goals.accepted {
-            if followed.cancelled.try_recv().is_ok() {
+            let is_abandoned = followed.events.is_closed() && followed.cancel.is_none();
+            if followed.cancelled.try_recv().is_ok() || is_abandoned {
                 followed.cancel = self.client.cancel_goal(*goal).ok();
             }
         }
@@ -404,9 +416,13 @@ impl<A: Action> ClientGoals<A> {
     fn note_cancellation(&mut self, request: RmwRequestId, code: CancelGoalResponseEnum) {
         use CancelGoalResponseEnum::{GoalTerminated, UnknownGoal};
         let followed = self.accepted.values_mut().find(|followed| followed.cancel == Some(request));
-        if let Some(followed) = followed.filter(|_| matches!(code, UnknownGoal | GoalTerminated)) {
-            followed.prospect.ended.get_or_insert_with(Instant::now);
-        }
+        let Some(Followed { prospect, .. }) = followed else { return };
+        let since = match code {
+            UnknownGoal => &mut prospect.unknown,
+            GoalTerminated => &mut prospect.ended,
+            _ => return,
+        };
+        since.get_or_insert_with(Instant::now);
     }
 }
 
@@ -447,19 +463,34 @@ mod tests {
 
     use super::{Loss, Prospect};
 
+    #[derive(Clone, Copy)]
+    enum End {
+        Ended(u64),
+        /// The goal ends with a result that cannot be decoded.
+        Malformed(u64),
+        Unknown(u64),
+    }
+
     fn servers(names: &str) -> BTreeSet<[u8; 16]> {
         names.bytes().map(|name| [name; 16]).collect()
     }
 
     /// Checks the loss of a goal that the servers with the letters `before` could have accepted. `looks` are the times
-    /// of look-ups in milliseconds, and the present servers. The goal ends at the time `ended`.
-    fn check(before: &str, ended: Option<u64>, looks: &[(u64, &str)], expected: Option<(u64, Loss)>) {
+    /// of look-ups in milliseconds, and the present servers. The goal ends, or the server reports it as unknown, at the
+    /// time of `end`.
+    fn check(before: &str, end: Option<End>, looks: &[(u64, &str)], expected: Option<(u64, Loss)>) {
         let start = Instant::now();
         let at = |millis: u64| start + Duration::from_millis(millis);
-        let mut prospect = Prospect { servers: servers(before), changed: None, ended: None };
+        let mut prospect = Prospect { servers: servers(before), changed: None, ended: None, unknown: None };
         let mut losses = looks.iter().filter_map(|(millis, present)| {
-            prospect.ended = ended.filter(|ended| ended <= millis).map(at);
-            Some((*millis, prospect.loss(&servers(present), at(*millis))?))
+            let at_end = |time: u64| (time <= *millis).then(|| at(time));
+            match end {
+                Some(End::Ended(time) | End::Malformed(time)) => prospect.ended = at_end(time),
+                Some(End::Unknown(time)) => prospect.unknown = at_end(time),
+                None => {}
+            }
+            let is_malformed = matches!(end, Some(End::Malformed(_)));
+            Some((*millis, prospect.loss(&servers(present), is_malformed, at(*millis))?))
         });
         assert_eq!(losses.next(), expected, "{before} {looks:?}");
     }
@@ -475,6 +506,12 @@ mod tests {
         check("a", None, &[(0, "a"), (100, "b"), (700, "b")], Some((700, Loss::Server)));
         // The goal was accepted while the endpoints of a crashed server remained.
         check("ab", None, &[(0, "ab"), (20_000, "b"), (40_000, "b")], None);
-        check("a", Some(100), &[(3000, "a"), (3100, "a")], Some((3100, Loss::Result)));
+        for end in [End::Malformed(100), End::Unknown(100)] {
+            check("a", Some(end), &[(3000, "a"), (3100, "a")], Some((3100, Loss::Result)));
+        }
+        // The callback of a server continues for minutes after the end of the goal.
+        let looks = [(3100, "a"), (540_000, "a"), (600_100, "a")];
+        check("a", Some(End::Ended(100)), &looks, Some((600_100, Loss::Result)));
+        check("a", Some(End::Ended(100)), &[(9000, ""), (9500, "")], Some((9500, Loss::Server)));
     }
 }
