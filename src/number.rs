@@ -17,6 +17,9 @@ const DECIMALS: u32 = 6;
 /// Maximum number of significant digits of a reported value that is not rounded.
 const EXACT_DIGITS: usize = 9;
 
+/// Maximum number of decimals of a reported value. Without a limit, noise near zero would be kept.
+const MAX_DECIMALS: u32 = 15;
+
 /// Maximum number of bits of the denominator of a value that [`bounded`] does not round.
 const MAX_DENOMINATOR_BITS: u64 = 64;
 
@@ -41,26 +44,27 @@ pub(crate) fn rounded(value: &BigRational) -> BigRational {
     (value * &scale).round() / scale
 }
 
-/// Rounds a reported decimal to six decimals, or to six significant digits if they have more decimals. Values of at most
-/// nine significant digits are not rounded. Floating-point values of a robot would otherwise make the planner's integers
-/// huge.
+/// Rounds a reported decimal to six decimals, or to six significant digits if they have more decimals, but at most to
+/// [`MAX_DECIMALS`]. Values of at most nine significant digits and so many decimals are not rounded. Floating-point
+/// values of a robot would otherwise make the planner's integers huge.
 pub(crate) fn reported(value: &BigRational) -> BigRational {
-    let shifted = value * BigRational::from_integer(scale_of(value));
-    if shifted.to_integer().abs().to_string().len() <= EXACT_DIGITS {
+    let whole = |power| BigRational::from_integer(BigInt::from(10).pow(power));
+    let (shift, greatest) = (BigRational::from_integer(scale_of(value)), whole(MAX_DECIMALS));
+    if shift <= greatest && (value * shift).to_integer().abs().to_string().len() <= EXACT_DIGITS {
         return value.clone();
     }
-    let whole = |power| BigRational::from_integer(BigInt::from(10).pow(power));
     let (mut scale, least) = (whole(DECIMALS), whole(DECIMALS - 1));
-    while value.abs() * &scale < least {
+    while value.abs() * &scale < least && scale < greatest {
         scale *= whole(1);
     }
     (value * &scale).round() / scale
 }
 
-/// Returns `true` if `value` rounded to the decimals of the decimal `report`, at least six, is `report`.
+/// Returns `true` if `value` rounded to the decimals of the decimal `report`, at least six, is `report`. A `report` of 0
+/// confirms only 0, because a small value can be positive in conditions.
 pub(crate) fn confirms(report: &BigRational, value: &BigRational) -> bool {
     let scale = BigRational::from_integer(scale_of(report).max(BigInt::from(10).pow(DECIMALS)));
-    (value * &scale).round() == report * scale
+    report.is_zero() == value.is_zero() && (value * &scale).round() == report * scale
 }
 
 /// Returns the least power of ten whose product with a decimal is an integer.
@@ -125,6 +129,10 @@ mod tests {
             ("0.3333334", "0.3333334"),
             ("-12.0000004", "-12.0000004"),
             ("0.0000004", "0.0000004"),
+            ("4e-15", "0.000000000000004"),
+            ("4e-16", "0"),
+            ("1.2246467991473532e-16", "0"),
+            ("1.2246467991473532e-12", "0.000000000001225"),
             ("0.30000000000000004", "0.3"),
             ("0.30000001192092896", "0.3"),
             ("-0.00012345678901234", "-0.000123457"),
@@ -143,6 +151,8 @@ mod tests {
         ] {
             assert_eq!(confirms(&exact(report).expect("a number"), &third), expected, "{report}");
         }
+        let (zero, small) = (exact("0").expect("a number"), exact("4e-7").expect("a number"));
+        assert!(confirms(&zero, &zero) && !confirms(&zero, &small) && !confirms(&small, &zero));
     }
 
     #[test]

@@ -284,6 +284,11 @@ impl Coadaptation {
             );
             problems.push(Message::error("M127", text));
         }
+        let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
+        if is_timed || !problem.constraints.is_empty() || !mission.domain().constraints.is_empty() {
+            let text = "a process of places has no constraints, preferences or timed initial literals";
+            problems.push(Message::error("M127", text));
+        }
         let Some(goal) = goal.filter(|_| problems.is_empty()) else { return Err(problems.into()) };
         let mut places: Vec<String> = vec![start.clone(), goal.clone()];
         let mut designs: Vec<String> = vec![configured.clone()];

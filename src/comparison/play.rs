@@ -107,8 +107,8 @@ pub fn play<N: Number>(
     let rewards: Vec<Vec<f64>> = chain.rewards.iter().map(doubles).collect();
     let Explored { mdp, starts, states, deadlocks, .. } = chain;
     let rounded = Explored { mdp: mdp.to_f64(), starts, states, rewards, deadlocks };
-    let interrupted = Error::Interrupted { states: rounded.mdp.states() };
-    measure(&is_goal, &rounded, penalty, reserve, replans).ok_or(interrupted)
+    let imprecise = Error::Imprecise { precision: MAX_WIDTH };
+    measure(&is_goal, &rounded, penalty, reserve, replans).ok_or(imprecise)
 }
 
 /// Greatest width of the bounds on a value in doubles, relative to the value if it is above 1.

@@ -100,6 +100,8 @@ pub struct Loop {
     agenda: Option<Agenda>,
     /// Number of reactions that may have changed the planning problem, which identifies the current problem.
     pub(super) question: u64,
+    /// Number of consecutive results of searches for earlier planning problems that could not be used.
+    pub(super) late_results: u32,
     pub(super) digest: String,
     /// Number of names and values that the knowledge base had in addition to those of its documents when it was last
     /// rebuilt; 0 before.
@@ -136,7 +138,17 @@ impl Loop {
             beliefs.available = available(base);
         }
         let agenda = Some(Agenda { is_start: true, ..Agenda::default() });
-        Ok(Self { settings, beliefs, monitor, planner, agenda, question: 0, digest, rebuilt_growth: 0 })
+        Ok(Self {
+            settings,
+            beliefs,
+            monitor,
+            planner,
+            agenda,
+            question: 0,
+            late_results: 0,
+            digest,
+            rebuilt_growth: 0,
+        })
     }
 
     /// Returns the settings of the loop.
@@ -219,6 +231,7 @@ impl Loop {
         // Held reports that are due precede the events of this line.
         let due = self.monitor.elapse(&mut self.beliefs, &mut changes);
         answers.extend(due.into_iter().map(refused));
+        let due_news = u32::from(changes.is_news());
         for event in &observation.events {
             let outcome =
                 event.clone().and_then(|event| self.monitor.apply(&mut self.beliefs, &event, &mut changes));
@@ -244,8 +257,10 @@ impl Loop {
             }
             let findings = analyze_change(&mut self.beliefs, changes.base, &mut answers);
             react(&mut self.beliefs, &self.settings, &findings, &mut changes, &mut answers);
-            changes.news = u32::from(changes.is_news() || !findings.is_empty());
-            self.question += u64::from(changes.news);
+            let is_news = changes.is_news() || !findings.is_empty();
+            // A held report that is due counts in addition to the events of the line, such as a failure.
+            changes.news = due_news + u32::from(is_news);
+            self.question += u64::from(is_news);
             self.beliefs.considered = self.beliefs.now;
             let agenda = self.agenda.get_or_insert_default();
             agenda.changes.extend(changes);

@@ -98,7 +98,9 @@ fn merged(
         records.map(|record| (record[0].to_string(), record)).collect()
     };
     let (former, mut robot) = (by_name(former), by_name(robot));
-    let replaced = replaced_prefixes(&former, &robot);
+    let by_new = replaced_prefixes(&former, &by_name(new));
+    let mut replaced = replaced_prefixes(&former, &robot);
+    replaced.retain(|prefix| by_new.contains(prefix));
     let mut init = Vec::new();
     for element in new {
         let Some(record) = element_to_record(element) else {
@@ -111,7 +113,7 @@ fn merged(
             (before, Some(now)) if before != Some(&now) => init.extend(element_from_record(&now)),
             // The element is in the former version, but not in the state of the robot.
             (Some(_), None) => {}
-            // The robot has replaced a fact that the new version replaces, too, for example the place of the robot.
+            // The robot and the new version have replaced the same fact, for example the place of the robot.
             (None, None) if prefix(&record).is_some_and(|prefix| replaced.contains(&prefix)) => {}
             _ => init.push(element.clone()),
         }
@@ -128,8 +130,8 @@ fn prefix(record: &Value) -> Option<String> {
     (record[1] == Value::Bool(true) && !words.is_empty()).then(|| Value::from(words).to_string())
 }
 
-/// Returns the prefixes with which both `former` and `robot` have a single fact, but different ones.
-fn replaced_prefixes(former: &BTreeMap<String, Value>, robot: &BTreeMap<String, Value>) -> BTreeSet<String> {
+/// Returns the prefixes with which both `former` and `later` have a single fact, but different ones.
+fn replaced_prefixes(former: &BTreeMap<String, Value>, later: &BTreeMap<String, Value>) -> BTreeSet<String> {
     let facts = |elements: &BTreeMap<String, Value>| {
         let mut facts: BTreeMap<String, Vec<String>> = BTreeMap::new();
         for (name, record) in elements {
@@ -139,10 +141,10 @@ fn replaced_prefixes(former: &BTreeMap<String, Value>, robot: &BTreeMap<String, 
         }
         facts
     };
-    let (before, mut after) = (facts(former), facts(robot));
+    let (before, mut after) = (facts(former), facts(later));
     let is_replaced = |(prefix, names): (String, Vec<String>)| {
-        let robot_names = after.remove(&prefix)?;
-        (names.len() == 1 && robot_names.len() == 1 && names != robot_names).then_some(prefix)
+        let later_names = after.remove(&prefix)?;
+        (names.len() == 1 && later_names.len() == 1 && names != later_names).then_some(prefix)
     };
     before.into_iter().filter_map(is_replaced).collect()
 }
@@ -195,6 +197,12 @@ mod tests {
         let grown =
             merged(&former, &robot, &init(&[("free a", "true"), ("free b", "true"), ("free d", "true")]));
         let expected = init(&[("free b", "true"), ("free d", "true"), ("free c", "true")]);
+        assert_eq!(format!("{grown:?}"), format!("{expected:?}"));
+        // The new version adds a blocked place, which the robot did not report.
+        let former = init(&[("blocked a", "true")]);
+        let robot = init(&[("blocked b", "true")]);
+        let grown = merged(&former, &robot, &init(&[("blocked a", "true"), ("blocked c", "true")]));
+        let expected = init(&[("blocked c", "true"), ("blocked b", "true")]);
         assert_eq!(format!("{grown:?}"), format!("{expected:?}"));
     }
 }

@@ -395,6 +395,11 @@ impl BeliefUpdate<'_> {
     /// does not fit the domain and the objects, restores the previous state and returns a refusal.
     fn set(&mut self, name: &str, value: &str) -> Result<bool, Refusal> {
         let mission = &mut self.beliefs.mission;
+        // There is nothing to check in a report of the value of a known function without arguments. This saves a copy of
+        // the initial state, which can be large.
+        if !name.contains(' ') && mission.is_function(name) && mission.value(name).is_some() {
+            return mission.set_in_problem(name, value).map_err(|message| fault(&message));
+        }
         let before = mission.problem().init.clone();
         let is_change = mission.set_in_problem(name, value).map_err(|message| fault(&message))?;
         // A fact can also be removed.

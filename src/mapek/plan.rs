@@ -40,12 +40,14 @@ pub(crate) struct Planner {
     pub question_log: Option<Vec<(StoredQuestion, Outcome)>>,
     /// Planning problems with outcomes that another thread has computed, in order.
     pub prepared: VecDeque<(StoredQuestion, Outcome)>,
-    /// Whether the situation may have changed since the prepared outcomes were computed, other than by progress of the
-    /// action under way.
+    /// Whether the number of the planning problem has changed since the prepared outcomes were computed.
     pub is_late: bool,
     /// Whether the last outcome is prepared and about another situation than the question, from which the situation
     /// differs by more than progress of the action under way.
     pub is_outdated: bool,
+    /// Whether the absence of a plan for another situation is a reason for a decision, because too many searches in a
+    /// row have ended with outcomes for other situations.
+    pub accepts_absence: bool,
     /// Whether a prepared outcome with a plan was about another situation than the question.
     pub has_outdated_plan: bool,
     pub live: Live,
@@ -57,7 +59,6 @@ impl Planner {
     /// Returns an outcome that is recorded (for replay), prepared by another thread, or cached. Otherwise searches for
     /// a plan. If searches are forbidden, sets `is_missing` and returns an outcome without a plan.
     pub fn plan(&mut self, question: &Question<'_>) -> Outcome {
-        self.is_outdated = false;
         // Recorded and prepared outcomes have an order. Therefore, they are consumed even if the memo has the answer.
         let recorded = self.recorded.pop_front().or_else(|| self.prepared(question));
         let stored_outcome = recorded.or_else(|| self.memo.recall(question));
@@ -89,7 +90,7 @@ impl Planner {
             self.has_outdated_plan |= outcome.steps.is_some();
             let was_proved = std::mem::take(&mut outcome.proved);
             if outcome.steps.is_none() {
-                outcome.was_proved = was_proved && !self.is_outdated;
+                outcome.was_proved = was_proved && (!self.is_outdated || self.accepts_absence);
                 "no plan was found for an earlier situation".clone_into(&mut outcome.because);
                 outcome.blocking.clear();
             }

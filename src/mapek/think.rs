@@ -4,7 +4,8 @@
 //! question in the meantime, the loop uses the recorded outcomes without a search. Progress of the action under
 //! way, ticks, and repeated reports do not change the question; after such progress, however, the plan is no
 //! longer reported as optimal, or its absence as proved. Plans for a changed question are used only after several
-//! cancelled searches in a row, and only if they fit the situation. The absence of such a plan is never used.
+//! cancelled searches in a row, and only if they fit the situation. The absence of a plan that continues is used only
+//! after several results for changed questions in a row, and does not count as proved.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -78,6 +79,11 @@ pub struct ParallelSearch {
 /// Number of consecutive cancelled searches after which a changed problem does not cancel the next one. A
 /// search without a current problem is always cancelled.
 const MAX_CANCELLED: u32 = 3;
+
+/// Number of consecutive unusable results for changed problems after which the absence of a plan for a changed problem
+/// is a reason for a decision. Otherwise, observations that change the problem all the time would prevent every
+/// decision without a plan.
+const MAX_LATE: u32 = 3;
 
 impl ParallelSearch {
     /// Registers a search that begins. An earlier search that is still registered is interrupted.
@@ -182,12 +188,14 @@ impl Loop {
             self.roll_back(before);
             return None;
         }
+        self.late_results = 0;
         Some(answers)
     }
 
-    /// Runs [`Loop::deliberate`] with the plans in `thoughts`. Returns `None` and leaves the loop unchanged if planning
-    /// was interrupted, if the loop that planned has another mission, or if a plan is missing or does not fit the
-    /// situation. Unless `is_late` is `true`, this is also the case if the planning problem has changed since.
+    /// Runs [`Loop::deliberate`] with the plans in `thoughts`. Returns `None` and leaves the loop unchanged, except
+    /// for the number of late results, if planning was interrupted, if the loop that planned has another mission, or if
+    /// a plan is missing or does not fit the situation. Unless `is_late` is `true`, this is also the case if the
+    /// planning problem has changed since.
     pub fn deliberate_with(&mut self, thoughts: Thoughts, is_late: bool) -> Option<Vec<Answer>> {
         if !self.is_usable(&thoughts) || !self.is_answered_by(&thoughts) && !is_late {
             return None;
@@ -195,6 +203,7 @@ impl Loop {
         // A checkpoint covers only changes before the first plan. Therefore, the whole loop is copied.
         let before = self.clone();
         self.planner.is_late = !self.is_answered_by(&thoughts);
+        self.planner.accepts_absence = self.planner.is_late && self.late_results >= MAX_LATE;
         self.planner.prepared = thoughts.answers.into();
         self.planner.forbids_search = true;
         let answers = self.deliberate();
@@ -206,10 +215,15 @@ impl Loop {
                 && self.beliefs.violation().is_some()
         };
         if self.planner.is_missing || misfits() {
+            let late_results = self.late_results + u32::from(self.planner.is_late);
             *self = before;
+            self.late_results = late_results;
             return None;
         }
+        self.late_results = 0;
+        self.planner.accepts_absence = false;
         self.planner.forbids_search = false;
+        self.planner.is_outdated = false;
         self.planner.has_outdated_plan = false;
         self.planner.prepared.clear();
         Some(answers)
@@ -221,6 +235,7 @@ mod tests {
     use std::path::Path;
     use std::time::Duration;
 
+    use crate::knowledge::Fault;
     use crate::mapek::control::Loop;
     use crate::mapek::event::Observation;
     use crate::setup::Setup;
@@ -244,5 +259,24 @@ mod tests {
         let kinds: Vec<_> = answers.iter().map(|answer| answer.to_json()["answer"].clone()).collect();
         assert_eq!(kinds, ["plan_requested", "plan_kept"]);
         assert!(!control.has_agenda());
+    }
+
+    /// Otherwise, this search, too, would be repeated without end.
+    #[test]
+    fn missing_conclusions_are_no_reason_to_search_again() {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
+        let Setup { mission, settings, .. } = Setup::read(&manifest).expect("the mission is read");
+        let mut control = Loop::new(mission, settings).expect("a loop");
+        control.start();
+        control.planner.is_outdated = true;
+        let goal = r#"{"event":"goal_changed","goal":"(robot_at wp2)"}"#;
+        control.react(&Observation::parse(goal), Duration::from_secs(1));
+        control.beliefs.fault = Some(Fault {
+            code: "R301".to_owned(),
+            message: "too many steps".to_owned(),
+            rule: "counting".to_owned(),
+        });
+        let answers = control.deliberate_at_once().expect("no search is needed");
+        assert!(answers.iter().any(|answer| answer.to_json()["answer"] == "plan_none"), "{answers:?}");
     }
 }

@@ -141,6 +141,41 @@ fn the_absence_of_a_plan_in_an_earlier_situation_is_not_used() {
     assert!(has(&control.deliberate(), "plan_found"));
 }
 
+/// The situation changes during each search. Otherwise, there would be neither a decision nor a pause between searches.
+#[test]
+fn the_absence_of_a_plan_is_used_after_three_results_for_earlier_situations() {
+    for (is_moving, expected) in [(false, "plan_none"), (true, "cancel_action")] {
+        let roads = if is_moving { "(road b c) (road b d)" } else { "(road b c)" };
+        let mut control = crossroads(roads, if is_moving { "c" } else { "d" });
+        control.start();
+        if is_moving {
+            feed(&mut control, r#"{"event":"action_started","action":1}"#);
+            react(&mut control, r#"{"event":"goal_changed","goal":"(at d)"}"#);
+        }
+        for round in 0..8 {
+            react(&mut control, &fact("road d b", if round % 2 == 0 { "true" } else { "false" }));
+            let thoughts = control.thinker().think();
+            react(&mut control, &fact("road d c", if round % 2 == 0 { "true" } else { "false" }));
+            let mut replayed = control.clone();
+            let Some(answers) = control.deliberate_with(thoughts, true) else {
+                assert!(round % 4 < 3, "{round}");
+                continue;
+            };
+            assert_eq!(round % 4, 3, "the results are counted again: {answers:?}");
+            assert_eq!(kinds(&answers), ["plan_requested", expected]);
+            let is_unproved =
+                |answer: &Answer| !matches!(answer, Answer::PlanNone { status: "unsolvable", .. });
+            assert!(answers.iter().all(is_unproved), "{answers:?}");
+            let plans = control.decision(&answers).plans;
+            assert_eq!(replayed.deliberate_again(&plans), answers);
+            assert_eq!(replayed.snapshot(), control.snapshot());
+            if is_moving {
+                break;
+            }
+        }
+    }
+}
+
 /// Only conditions, not the configuration of a step, mention the lost design.
 #[test]
 fn a_lost_design_that_a_condition_or_the_goal_reads_leads_to_a_plan() {
@@ -186,6 +221,28 @@ fn a_report_that_arrives_with_the_third_failure_leads_to_a_plan() {
     }
 }
 
+/// A debounced measurement is believed in the same line as the failure.
+#[test]
+fn a_held_report_that_is_due_with_the_third_failure_leads_to_a_plan() {
+    let domain = "(define (domain d) (:requirements :strips :typing) (:types open)
+      (:predicates (visited ?p - open) (done))
+      (:action visit :parameters (?p - open) :precondition (and) :effect (visited ?p))
+      (:action go :parameters () :precondition (and) :effect (done)))";
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done)))";
+    let bindings = "[bindings]\nopen = 'class:OpenPlace'\n[adaptation.measured.light]\ndebounce = 5";
+    for (measurement, expected) in [("0.5", "plan_none"), ("0.9", "request_action")] {
+        let mut control = lighted(domain, problem, bindings);
+        control.start();
+        for action in 1..=2 {
+            feed(&mut control, &format!(r#"{{"event":"action_failed","action":{action}}}"#));
+        }
+        let answers = react(&mut control, &light(measurement));
+        assert!(!has(&answers, "error"), "{answers:?}");
+        let answers = feed(&mut control, r#"{"event":"action_failed","action":3,"time":30}"#);
+        assert!(has(&answers, expected), "{measurement}: {answers:?}");
+    }
+}
+
 const KNOWLEDGE: &str = "@prefix : <http://example.org/m#> .
 @prefix owl: <http://www.w3.org/2002/07/owl#> .
 @prefix t: <http://metacontrol.org/tomasys#> .
@@ -212,7 +269,8 @@ fn lighted(domain: &str, problem: &str, bindings: &str) -> Loop {
         std::fs::write(directory.path().join(name), text).expect("a file");
     }
     let setup = Setup::parse("m.toml", &manifest, directory.path());
-    Loop::new(setup.expect("the mission is read").mission, Settings::immediate()).expect("a loop")
+    let Setup { mission, settings, .. } = setup.expect("the mission is read");
+    Loop::new(mission, settings.with_settle(Duration::ZERO)).expect("a loop")
 }
 
 fn light(value: &str) -> String {
@@ -234,7 +292,13 @@ fn inferred_objects_and_measured_facts_lead_to_a_plan() {
     let domain = "(define (domain d) (:requirements :strips :typing) (:predicates (done))
       (:action go :parameters () :precondition (hasValue obs_light 0.9_decimal) :effect (done)))";
     let planta = lighted(domain, "(define (problem p) (:domain d) (:init) (:goal (done)))", "");
-    for mut control in [open_place(), planta] {
+    // The goal can read it, too.
+    let domain = "(define (domain d) (:requirements :strips :typing) (:predicates (done))
+      (:action go :parameters () :precondition (isQAtype obs_light light) :effect (done)))";
+    let goal =
+        "(define (problem p) (:domain d) (:init) (:goal (and (done) (hasValue obs_light 0.9_decimal))))";
+    let in_goal = lighted(domain, goal, "");
+    for mut control in [open_place(), planta, in_goal] {
         let answers = control.start();
         assert!(has(&answers, "plan_none"), "{answers:?}");
         let answers = feed(&mut control, &light("0.9"));

@@ -509,7 +509,7 @@ fn rewards_of_moves_with_similar_names_are_separate() {
 
 #[test]
 fn invalid_processes_are_refused() {
-    use pddl::ast::{Condition, InitialElement, Name, Problem as Pddl, Term};
+    use pddl::ast::{Condition, Constraint, InitialElement, Name, Problem as Pddl, Span, Term, Trajectory};
     let Setup { mission, roles, .. } =
         Setup::read(&root().join("missions/camara_like.toml")).expect("a mission");
     let (problem, _) = mission.filled().expect("filled");
@@ -559,6 +559,18 @@ fn invalid_processes_are_refused() {
     for parts in [vec![goal.clone(), photo.clone()], vec![photo.clone(), goal], vec![photo]] {
         assert_eq!(codes(&with_goal(parts)), ["M127"]);
     }
+    let mut timed = problem.clone();
+    let literal =
+        InitialElement::Timed(BigRational::from_integer(5.into()), fact.clone(), false, Span::default());
+    timed.init.push(literal);
+    assert_eq!(codes(&timed), ["M127"]);
+    let constraint = Constraint {
+        variables: Vec::new(),
+        preference: None,
+        trajectory: Trajectory::Always(Condition::And(Vec::new())),
+        span: Span::default(),
+    };
+    assert_eq!(codes(&Pddl { constraints: vec![constraint], ..problem.clone() }), ["M127"]);
     for predicate in ["robot_at", "configured"] {
         let mut two_facts = problem.clone();
         let fact = problem.init.iter().find_map(|element| match element {

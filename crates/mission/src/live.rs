@@ -8,7 +8,7 @@ use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
 use ontology::vocab::local_name;
 use pddl::ast::{Atom, Condition, Declaration, Domain, InitialElement, Name, Problem, Term};
-use pddl::{self, Severity, Source};
+use pddl::{self, Mentioned, Severity, Source};
 use rules::Fact;
 
 use crate::binding;
@@ -86,11 +86,14 @@ impl Mission {
     }
 
     /// Returns `true` if a fact of the knowledge base can be part of the filled problem by its predicate: a class that is
-    /// bound to a type, or in PLANTA's form a predicate that the domain file uses.
+    /// bound to a type, or in PLANTA's form a predicate that the domain file or the goal
+    /// uses.
     pub fn contains_fact(&self, fact: &Fact) -> bool {
         let Some(engine) = self.knowledge.as_ref().map(Knowledge::engine) else { return false };
         if let Some(planta) = &self.planta {
-            return planta.uses(fact, engine);
+            let mut in_goal = Mentioned::default();
+            in_goal.condition(&self.problem.goal);
+            return planta.uses(fact, engine, &in_goal.predicates);
         }
         let iri = engine.symbols().value(fact.predicate).as_name().unwrap_or_default();
         let is_class = |class: String| class == *iri || class == local_name(iri);

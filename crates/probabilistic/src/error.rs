@@ -59,6 +59,12 @@ pub enum Error {
         /// Number of reached states.
         states: usize,
     },
+    /// A value cannot be computed in doubles with a relative precision of `precision`.
+    #[error("a value cannot be computed with a relative precision of {precision}")]
+    Imprecise {
+        /// The required precision.
+        precision: f64,
+    },
     /// The text of a policy is malformed, or a policy does not match the model.
     #[error("{0}")]
     Policy(String),

@@ -437,7 +437,6 @@ fn fronts_of_probabilities_do_not_wait_for_ever() {
     }
 }
 
-/// An improvement of a policy travels one state in a round, so that there are more than a thousand rounds.
 /// The choice `fast` takes 2 and hits with probability 1/2, `slow` takes 3 and never hits.
 #[test]
 fn bounds_of_two_objectives_need_the_right_operator() {
@@ -472,6 +471,7 @@ fn bounds_of_two_objectives_need_the_right_operator() {
     }
 }
 
+/// An improvement of a policy travels one state in a round, so that there are more than a thousand rounds.
 #[test]
 fn exact_policy_iteration_ends_at_the_optimum() {
     let model = "mdp module m s:[0..1200] init 0;

@@ -93,11 +93,13 @@ impl Planta {
         (Self { terms: Arc::new(terms_of_mission), number, known: predicates, used }, completed, warnings)
     }
 
-    /// Returns `true` if the domain file uses the predicate of a fact: as an assertion, or as an assertion or inference.
-    pub(crate) fn uses(&self, fact: &Fact, engine: &Engine) -> bool {
+    /// Returns `true` if the domain file or the goal, with the predicates `in_goal`, uses the predicate of a fact: as an
+    /// assertion, or as an assertion or inference.
+    pub(crate) fn uses(&self, fact: &Fact, engine: &Engine, in_goal: &BTreeSet<Name>) -> bool {
         let predicate =
             engine.symbols().value(fact.predicate).as_name().and_then(|iri| self.terms.symbols.get(iri));
-        predicate.is_some_and(|name| self.used.contains(name) || self.used.contains(&names::inferred(name)))
+        let is_used = |name: &Name| self.used.contains(name) || in_goal.contains(name);
+        predicate.is_some_and(|name| is_used(name) || is_used(&names::inferred(name)))
     }
 
     pub(crate) fn known(&self) -> &HashSet<Name> {
