@@ -107,7 +107,7 @@ fn name_importer(components: &mut Vec<Annotated>, build: &ho::Build<RcStr>) {
 
 /// Replaces each axiom about three or more disjoint classes by the axioms about all pairs. The RDF writer would
 /// write only the pairs of the first class. An axiom with more than [`MAX_PAIRED_MEMBERS`] classes becomes the
-/// disjoint union of an auxiliary class, which has the list that [`with_blank_nodes`] needs.
+/// disjoint union of an auxiliary class, which has the list that [`with_blank_nodes`] needs. It loses its annotations.
 fn pair_disjoint_classes(components: &mut Vec<Annotated>, build: &ho::Build<RcStr>) {
     let is_nary = |item: &mut Annotated| match &item.component {
         Component::DisjointClasses(axiom) => axiom.0.len() > 2,
@@ -120,10 +120,6 @@ fn pair_disjoint_classes(components: &mut Vec<Annotated>, build: &ho::Build<RcSt
         let Component::DisjointClasses(ho::DisjointClasses(classes)) = component else { continue };
         if classes.len() > MAX_PAIRED_MEMBERS {
             let group = build.class(format!("{BLANK}disjoint{index}"));
-            components.extend(ann.into_iter().map(|ann| {
-                let subject = ho::AnnotationSubject::IRI(group.0.clone());
-                ho::AnnotationAssertion { subject, ann }.into()
-            }));
             components.push(ho::DisjointUnion(group, classes).into());
             continue;
         }
@@ -167,7 +163,7 @@ fn arguments(atom: &mut ho::Atom<RcStr>) -> Vec<Argument<'_>> {
     }
 }
 
-/// Renames the variables whose name is also the name of an individual in a rule. In RDF, a declaration as a variable
+/// Gives variables names that no individual has, in this document and in other ones. In RDF, a declaration as a variable
 /// would apply to both.
 fn rename_variables(components: &mut [Annotated], build: &ho::Build<RcStr>) {
     let mut atoms: Vec<&mut ho::Atom<RcStr>> = Vec::new();
@@ -188,7 +184,8 @@ fn rename_variables(components: &mut [Annotated], build: &ho::Build<RcStr>) {
             Argument::Individual(ho::Individual::Anonymous(_)) | Argument::Literal => {}
         }
     }
-    let mut ambiguous: Vec<ho::IRI<RcStr>> = variables.intersection(&individuals).cloned().collect();
+    let is_ambiguous = |name: &&ho::IRI<RcStr>| !name.starts_with(VARIABLES) || individuals.contains(*name);
+    let mut ambiguous: Vec<ho::IRI<RcStr>> = variables.iter().filter(is_ambiguous).cloned().collect();
     ambiguous.sort();
     let mut names = HashMap::new();
     for iri in ambiguous {
