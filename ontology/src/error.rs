@@ -280,7 +280,8 @@ pub enum Warning {
     },
     /// O207: a document retracts a statement that is not stated.
     #[error(
-        "warning[O207]: nothing states {statement}, so it cannot be retracted; conclusions from other statements remain"
+        "warning[O207]: the knowledge base has no statement {statement} that could be retracted; what other statements \
+         say or imply remains"
     )]
     NotStated {
         /// The axiom in functional-style syntax, or the rule in SWRL's human-readable syntax.

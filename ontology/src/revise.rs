@@ -238,7 +238,7 @@ impl Stated {
             let mut is_stated =
                 !retracted_facts.is_empty() && retracted_facts.iter().all(|fact| engine.is_asserted(fact));
             if removed.len() == before && is_stated {
-                // Otherwise, another axiom states it, which remains.
+                // If another axiom states the fact, the fact remains, and the warning says so.
                 let symbols = engine.symbols_mut();
                 let related =
                     self.ontology.axioms.iter().filter(|other| resembles(&retraction[0].axiom, &other.axiom));

@@ -200,6 +200,13 @@ fn axioms_in_unusual_forms_are_read() {
                 "DisjointClasses(<D> <E>)",
             ],
         ),
+        // Two lists with a common rest.
+        (
+            "_:a rdf:first :C ; rdf:rest _:t . _:b rdf:first :D ; rdf:rest _:t . _:t rdf:first :E ; rdf:rest () .
+             [] a owl:AllDisjointClasses ; owl:members _:a . :E a owl:Class .
+             :F a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:unionOf _:b ] .",
+            &["EquivalentClasses(<F> ObjectUnionOf(<D> <E>))", "DisjointClasses(<C> <E>)"],
+        ),
     ] {
         let ontology = turtle(text);
         assert_eq!(shown(&ontology), expected, "{text}\n{:?}", warnings(&ontology));
@@ -528,6 +535,11 @@ fn documents_do_not_import_themselves_by_name() {
             assert!(matches!(&errors[..], [Error::UnresolvedImport { .. }]), "{errors:?}");
         }
     }
+    // A copy of the document, for example an installed one, is not the import either.
+    let files = directory(&[("kb/robot.owl", &text), ("share/robot.owl", &text)]);
+    let options = ReadOptions { directories: vec![files.path().to_owned()], ..ReadOptions::default() };
+    let errors = read_files(&[files.path().join("kb/robot.owl")], &options).expect_err("unresolved");
+    assert!(matches!(&errors[..], [Error::UnresolvedImport { .. }]), "{errors:?}");
     let url = "https://raw.githubusercontent.com/meta-control/mc_mdl_tomasys/ros2/owl/tomasys.owl";
     let files = directory(&[("tomasys.owl", &importing("http://me/tomasys", &[url]))]);
     let ontology =

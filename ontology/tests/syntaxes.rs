@@ -303,6 +303,20 @@ fn variables_and_individuals_may_have_one_iri() {
         let facts = ["<urn:x#A>(<urn:x#b>)", "<urn:x#B>(<urn:x#b>)"].map(str::to_owned);
         assert_eq!(conclusions(&ontology), (BTreeSet::from(facts), true));
     }
+    // A variable of one document is an individual of another one.
+    let variable = "Declaration(Class(:A)) Declaration(Class(:B))
+        DLSafeRule(Body(ClassAtom(:A Variable(:a))) Head(ClassAtom(:B Variable(:a))))";
+    let individual = "Declaration(Class(:A)) Declaration(Class(:C)) Declaration(NamedIndividual(:a))
+        DLSafeRule(Body(ClassAtom(:A :a)) Head(ClassAtom(:C :a))) ClassAssertion(:A :b)";
+    let directory = tempfile::tempdir().expect("a folder");
+    let files = ["a.owl", "b.owl"].map(|name| directory.path().join(name));
+    for document in [functional, owl_xml] {
+        std::fs::write(&files[0], document("http://e/a", "", variable)).expect("written");
+        std::fs::write(&files[1], document("http://e/b", "", individual)).expect("written");
+        let ontology = read_files(&files, &ReadOptions::default()).expect("readable");
+        let facts = ["<urn:x#A>(<urn:x#b>)", "<urn:x#B>(<urn:x#b>)"].map(str::to_owned);
+        assert_eq!(conclusions(&ontology), (BTreeSet::from(facts), true));
+    }
 }
 
 #[test]

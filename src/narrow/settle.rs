@@ -46,8 +46,8 @@ pub(super) fn with_certain_conditions<'d>(domain: &'d Domain, problem: &Problem)
     certain
 }
 
-/// Returns the guards of a domain without uncertain conditions: the classes that all actions require of the arguments of
-/// facts that they add. `varying` contains the predicates that actions or timed initial literals change
+/// Returns the guards of a domain from [`with_certain_conditions`]: the classes that all actions require of the arguments
+/// of facts that they add. `varying` contains the predicates that actions or timed initial literals change
 /// and the derived predicates; they do not count as classes, because members of a class must be
 /// fixed by the initial state. Predicates in `timed` have no guards.
 pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet<Name>) -> Guards {

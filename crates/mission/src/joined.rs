@@ -30,7 +30,7 @@ pub struct Mission {
     /// The filled problem. Every method that changes the problem or the knowledge base calls [`Self::forget`].
     pub(super) current: OnceLock<Arc<Problem>>,
     /// The domain with conditions on designs at the start of actions whose duration may be 0 in the current situation.
-    /// `None` if there is no such action. Emptied like `current`.
+    /// `None` if there is no such action. Emptied by [`Self::forget`].
     instantaneous: OnceLock<Option<Arc<Domain>>>,
     pub(super) adaptation: Option<CoAdaptation>,
     /// Designs whose availability is stated by the problem, not inferred from the knowledge base.
@@ -332,7 +332,11 @@ impl Mission {
     /// declarations of the knowledge base.
     pub fn domain(&self) -> &Domain {
         let Some(adaptation) = &self.adaptation else { return &self.domain };
-        let instantaneous = || adaptation.with_starts(&self.domain, &self.current()).map(Arc::new);
+        let instantaneous = || {
+            // The problem is filled only if values decide on a duration.
+            let depends_on_values = adaptation.may_be_instantaneous(&self.domain);
+            depends_on_values.then(|| adaptation.with_starts(&self.domain, &self.current()))?.map(Arc::new)
+        };
         self.instantaneous.get_or_init(instantaneous).as_deref().unwrap_or(&self.domain)
     }
 

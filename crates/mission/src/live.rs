@@ -48,6 +48,8 @@ impl Mission {
 
     /// Returns the problem of [`Mission::current`], and empties its cache. Copies the problem only if it is shared.
     pub fn take_current(&mut self) -> Problem {
+        // The domain needs the filled problem, too, and is cached longer.
+        self.domain();
         let filled = self.current();
         self.current.take();
         Arc::unwrap_or_clone(filled)

@@ -1,7 +1,7 @@
 //! Transcribes OWL/XML and functional-style documents to N-Triples, and functional-style documents to OWL/XML,
 //! with the readers and writers of horned-owl. Rewrites components first that the RDF writer would lose or change.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use horned_owl::error::{HornedError, Location};
 use horned_owl::io::{self, ParserConfiguration, ofn, owx};
@@ -107,7 +107,7 @@ fn name_importer(components: &mut Vec<Annotated>, build: &ho::Build<RcStr>) {
 
 /// Replaces each axiom about three or more disjoint classes by the axioms about all pairs. The RDF writer would
 /// write only the pairs of the first class. An axiom with more than [`MAX_PAIRED_MEMBERS`] classes becomes the
-/// disjoint union of an auxiliary class, which has the list that [`with_blank_nodes`] needs.
+/// disjoint union of an auxiliary class, which has the list that [`with_blank_nodes`] needs. It loses its annotations.
 fn pair_disjoint_classes(components: &mut Vec<Annotated>, build: &ho::Build<RcStr>) {
     let is_nary = |item: &mut Annotated| match &item.component {
         Component::DisjointClasses(axiom) => axiom.0.len() > 2,
@@ -120,10 +120,6 @@ fn pair_disjoint_classes(components: &mut Vec<Annotated>, build: &ho::Build<RcSt
         let Component::DisjointClasses(ho::DisjointClasses(classes)) = component else { continue };
         if classes.len() > MAX_PAIRED_MEMBERS {
             let group = build.class(format!("{BLANK}disjoint{index}"));
-            components.extend(ann.into_iter().map(|ann| {
-                let subject = ho::AnnotationSubject::IRI(group.0.clone());
-                ho::AnnotationAssertion { subject, ann }.into()
-            }));
             components.push(ho::DisjointUnion(group, classes).into());
             continue;
         }
@@ -167,43 +163,47 @@ fn arguments(atom: &mut ho::Atom<RcStr>) -> Vec<Argument<'_>> {
     }
 }
 
-/// Renames the variables whose name is also the name of an individual in a rule. In RDF, a declaration as a variable
+/// Gives variables names that no individual has, in this document and in other ones. In RDF, a declaration as a variable
 /// would apply to both.
 fn rename_variables(components: &mut [Annotated], build: &ho::Build<RcStr>) {
-    let mut atoms: Vec<&mut ho::Atom<RcStr>> = Vec::new();
+    let mut rules: Vec<Vec<&mut ho::Atom<RcStr>>> = Vec::new();
     for item in components {
         if let Component::Rule(rule) = &mut item.component {
-            atoms.extend(rule.body.iter_mut().chain(&mut rule.head));
+            rules.push(rule.body.iter_mut().chain(&mut rule.head).collect());
         }
     }
-    let (mut individuals, mut variables) = (HashSet::new(), HashSet::new());
-    for argument in atoms.iter_mut().flat_map(|atom| arguments(atom)) {
-        match argument {
-            Argument::Individual(ho::Individual::Named(name)) => {
-                individuals.insert(name.0.clone());
-            }
-            Argument::Variable(variable) => {
+    let mut individuals = HashSet::new();
+    for argument in rules.iter_mut().flatten().flat_map(|atom| arguments(atom)) {
+        if let Argument::Individual(ho::Individual::Named(name)) = argument {
+            individuals.insert(name.0.clone());
+        }
+    }
+    for atoms in &mut rules {
+        // Names are distinct within a rule, so that variables keep their local names.
+        let mut variables = BTreeSet::new();
+        for argument in atoms.iter_mut().flat_map(|atom| arguments(atom)) {
+            if let Argument::Variable(variable) = argument {
                 variables.insert(variable.0.clone());
             }
-            Argument::Individual(ho::Individual::Anonymous(_)) | Argument::Literal => {}
         }
-    }
-    let mut ambiguous: Vec<ho::IRI<RcStr>> = variables.intersection(&individuals).cloned().collect();
-    ambiguous.sort();
-    let mut names = HashMap::new();
-    for iri in ambiguous {
-        let mut name = format!("{VARIABLES}{}", local_name(&iri));
-        while individuals.contains(&*name) || variables.contains(&*name) {
-            name.push('_');
+        let mut names = HashMap::new();
+        for iri in variables.clone() {
+            if iri.starts_with(VARIABLES) && !individuals.contains(&iri) {
+                continue;
+            }
+            let mut name = format!("{VARIABLES}{}", local_name(&iri));
+            while individuals.contains(&*name) || variables.contains(&*name) {
+                name.push('_');
+            }
+            variables.insert(build.iri(&*name));
+            names.insert(iri, build.variable(name));
         }
-        variables.insert(build.iri(&*name));
-        names.insert(iri, build.variable(name));
-    }
-    for argument in atoms.iter_mut().flat_map(|atom| arguments(atom)) {
-        if let Argument::Variable(variable) = argument
-            && let Some(name) = names.get(&variable.0)
-        {
-            *variable = name.clone();
+        for argument in atoms.iter_mut().flat_map(|atom| arguments(atom)) {
+            if let Argument::Variable(variable) = argument
+                && let Some(name) = names.get(&variable.0)
+            {
+                *variable = name.clone();
+            }
         }
     }
 }

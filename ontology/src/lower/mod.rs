@@ -211,7 +211,8 @@ impl Context<'_> {
         self.rules.retain(|_| flags.next() != Some(true));
     }
 
-    /// Returns the number of SWRL rules up to the one from which the rule `index` was lowered.
+    /// Identifies the SWRL rule from which the rule `index` was lowered, by its number (from 1). Rules lowered from axioms
+    /// come later and have the number of the last SWRL rule; their identities tell them apart.
     fn swrl_rule(&self, index: usize) -> usize {
         self.swrl_starts.partition_point(|&start| start <= index)
     }

@@ -4,7 +4,7 @@
 
 use std::collections::HashSet;
 
-use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term};
+use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
 
 use crate::error::Warning;
 use crate::graph::{Graph, iri_of, subject_of};
@@ -130,36 +130,43 @@ fn chain_fault(graph: &Graph, item: &Term) -> Option<String> {
     }
 }
 
-/// Replaces a list by a copy in every triple that refers to it, except the first, because horned-owl consumes lists. A
-/// list that is the rest of another list is copied for every triple. Removes the types `rdf:List` of list nodes.
+/// Replaces a list by a copy in every triple that refers to it, except the first, because horned-owl consumes lists. A list
+/// that has a node in common with an earlier list is also copied. Removes the types `rdf:List` of list nodes.
 fn unshare(graph: &mut Graph) {
     let references = graph.references();
     let is_shared = |node: &BlankNode| references.get(node).is_some_and(|&count| count > 1);
-    let (tails, heads): (Vec<_>, Vec<_>) =
-        graph.iter().partition(|(_, triple)| triple.predicate.as_str() == rdf::REST);
-    let tails = tails.into_iter().filter_map(|(_, triple)| match &triple.object {
-        Term::BlankNode(node) if is_shared(node) => Some(node.clone()),
-        _ => None,
+    let shares_tails = graph.iter().any(|(_, triple)| {
+        triple.predicate.as_str() == rdf::REST
+            && matches!(&triple.object, Term::BlankNode(node) if is_shared(node))
     });
-    let mut visited: HashSet<BlankNode> = tails.collect();
-    let shared: Vec<(usize, Term)> = heads
-        .into_iter()
-        .filter_map(|(index, triple)| match &triple.object {
-            Term::BlankNode(node) if is_shared(node) => {
-                let is_list =
-                    graph.objects(&NamedOrBlankNode::from(node.clone()), rdf::FIRST).next().is_some();
-                (is_list && !visited.insert(node.clone())).then(|| (index, triple.object.clone()))
-            }
-            _ => None,
-        })
-        .collect();
-    for (index, head) in shared {
-        if let Ok(list) = graph.list(&head) {
-            let copy = graph.add_list(list.items, None);
-            if let Some(triple) = graph.get_mut(index) {
-                triple.object = copy;
-            }
+    let refers_to_list = |triple: &Triple| match &triple.object {
+        Term::BlankNode(node) if triple.predicate.as_str() != rdf::REST => {
+            (shares_tails || is_shared(node))
+                && graph.objects(&NamedOrBlankNode::from(node.clone()), rdf::FIRST).next().is_some()
         }
+        _ => false,
+    };
+    let heads = graph.iter().filter(|(_, triple)| refers_to_list(triple));
+    let heads: Vec<(usize, Term)> = heads.map(|(index, triple)| (index, triple.object.clone())).collect();
+    let mut visited: HashSet<BlankNode> = HashSet::new();
+    for (index, head) in heads {
+        let Ok(list) = graph.list(&head) else { continue };
+        let shared_node = |&index: &usize| match &graph.get(index)?.subject {
+            NamedOrBlankNode::BlankNode(node) if is_shared(node) => Some(node.clone()),
+            _ => None,
+        };
+        let shared: Vec<BlankNode> = list.spine.iter().filter_map(shared_node).collect();
+        if !shared.iter().any(|node| visited.contains(node)) {
+            visited.extend(shared);
+            continue;
+        }
+        // No other list has the nodes before the first shared one.
+        let replaced = list.spine.iter().copied().take_while(|index| shared_node(index).is_none()).collect();
+        let copy = graph.add_list(list.items, None);
+        if let Some(triple) = graph.get_mut(index) {
+            triple.object = copy;
+        }
+        take(graph, replaced);
     }
     for (index, _) in graph.instances(rdf::LIST) {
         graph.take(index);

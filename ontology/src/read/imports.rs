@@ -9,7 +9,7 @@
 //!    Catalogs);
 //! 4. in the directory of the importing document, then in the given directories and their subdirectories: by ontology
 //!    IRI, then by the last segment of the URL; among several matching files, the one whose path has most segments of
-//!    the URL. The importing document itself is no match by name;
+//!    the URL. The importing document itself and its copies are no matches by name;
 //! 5. in a directory that is named like one of the first two segments of the URL's path and lies next to the
 //!    directory of the importing document or next to a near ancestor of it, because repositories are often checked
 //!    out side by side;
@@ -23,6 +23,7 @@ use std::sync::Arc;
 use percent_encoding::{AsciiSet, CONTROLS, percent_decode_str, utf8_percent_encode};
 
 use super::document;
+use super::file::regular_file;
 use super::options::ReadOptions;
 use super::syntax;
 use crate::error::{Error, Errors};
@@ -281,12 +282,18 @@ fn declared_iri(path: &Path) -> Option<String> {
     document::ontology_iri(&head)
 }
 
-/// Returns the file that fits an import best: by IRI, otherwise by name. A file does not import itself by name.
+/// Returns the file that fits an import best: by IRI, otherwise by name. By name, a file imports neither itself nor a
+/// copy of itself.
 fn best_match(import: &str, importer: Option<&Path>, files: &[OntologyFile]) -> Option<PathBuf> {
     let by_iri: Vec<_> =
         files.iter().filter(|file| file.iri.as_deref().is_some_and(|iri| same_iri(iri, import))).collect();
     let name = last_segment(import);
-    let is_importer = |path: &Path| path.canonicalize().is_ok_and(|path| Some(&*path) == importer);
+    let is_importer = |path: &Path| {
+        importer.is_some_and(|importer| {
+            path.canonicalize().is_ok_and(|path| path == importer)
+                || matches!((regular_file(path), regular_file(importer)), (Ok(a), Ok(b)) if a == b)
+        })
+    };
     let fits =
         |path: &Path| path.file_name().is_some_and(|file_name| file_name == name) && !is_importer(path);
     let by_name = || files.iter().filter(|file| fits(&file.path));

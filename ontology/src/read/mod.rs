@@ -196,7 +196,7 @@ fn closure(
 type Loaded = Option<(Document, Option<PathBuf>, Text)>;
 
 /// Reads and parses one document. Returns `None` if the same file was read before, or an equal text with the same
-/// meaning: relative IRIs can have another one in another directory.
+/// meaning. Equal texts in two directories differ in meaning if they have relative IRIs.
 fn load(
     item: Pending,
     documents: &[Document],

@@ -68,7 +68,8 @@ impl Structural<'_> {
         let undeclared = undeclared_prefixes(words.clone());
         let standard = |prefix: &[u8]| STANDARD_PREFIXES.iter().find(|(name, _)| name.as_bytes() == prefix);
         let missing = undeclared.iter().filter_map(|(_, prefix)| standard(prefix));
-        let declarations: String = missing.map(|(name, iri)| format!("Prefix({name}=<{iri}>)")).collect();
+        let declarations = missing.map(|(name, iri)| format!("Prefix({name}=<{iri}>)"));
+        let declarations = declarations.collect::<Vec<_>>().concat();
         let fault = |fault: horned::Fault| {
             match undeclared.iter().find(|(_, prefix)| standard(prefix).is_none()) {
                 // horned-owl reports an undeclared prefix as a generic syntax error.

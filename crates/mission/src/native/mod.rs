@@ -26,12 +26,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use num_rational::BigRational;
-use num_traits::Zero as _;
+use num_traits::{Signed as _, Zero as _};
 use ontology::tomasys::{FunctionDesign, Individual, Quality, View};
 use pddl::Signs;
 use pddl::ast::{
-    Action, ActionBody, Arithmetic, Assignment, Condition, ConditionTime, Declaration, Domain, Effect,
-    EffectTime, Expression, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
+    Action, ActionBody, Arithmetic, Assignment, Comparison, Condition, ConditionTime, Declaration, Domain,
+    DurationConstraint, Effect, EffectTime, Expression, Identifier, InitialElement, Name, Problem, Span,
+    Term, TypeExpression, TypedName,
 };
 
 use crate::binding::{Bindings, add_values, atom, has_value, identifier, is_pddl_name};
@@ -272,6 +273,24 @@ impl CoAdaptation {
         explicit
     }
 
+    /// Returns `true` if an action with designs is durative and has no number above 0 as lower bound of its duration.
+    pub(super) fn may_be_instantaneous(&self, domain: &Domain) -> bool {
+        let is_positive = |constraint: &DurationConstraint| {
+            let is_lower_bound = matches!(
+                constraint.operator,
+                Comparison::Equal | Comparison::GreaterOrEqual | Comparison::Greater
+            );
+            is_lower_bound
+                && matches!(&constraint.expression, Expression::Number(number, _) if number.is_positive())
+        };
+        let mut actions =
+            domain.actions.iter().filter(|action| self.actions.contains_key(&action.identifier.name));
+        actions.any(|action| match &action.body {
+            ActionBody::Durative { duration, .. } => !duration.iter().any(is_positive),
+            ActionBody::Instantaneous { .. } => false,
+        })
+    }
+
     /// Returns the explicit form `domain` with the conditions over all on designs also at the start of each action whose
     /// duration may be 0. Returns `None` if there is no such action.
     pub(super) fn with_starts(&self, domain: &Domain, problem: &Problem) -> Option<Domain> {
@@ -282,12 +301,12 @@ impl CoAdaptation {
         if !domain.actions.iter().any(admits_zero) {
             return None;
         }
-        let mut extended = domain.clone();
+        let (mut extended, added) = (domain.clone(), self.added());
         for action in extended.actions.iter_mut().filter(|action| admits_zero(action)) {
             let ActionBody::Durative { conditions, effects, .. } = &mut action.body else { continue };
             let lasting = conditions.iter().filter(|(time, condition)| {
                 *time == ConditionTime::OverAll
-                    && self.is_about_designs(condition)
+                    && is_about(condition, &added)
                     && !is_ended_context(condition, effects, domain)
             });
             let starts: Vec<_> = lasting.map(|(_, part)| (ConditionTime::AtStart, part.clone())).collect();
@@ -296,18 +315,9 @@ impl CoAdaptation {
         Some(extended)
     }
 
-    /// Returns `true` if a condition has an atom of a predicate that only the explicit form has.
-    fn is_about_designs(&self, condition: &Condition) -> bool {
-        let mut is_about_designs = false;
-        condition.walk(&mut |node| {
-            is_about_designs |= node.atom().is_some_and(|atom| self.is_added(&atom.predicate.name));
-        });
-        is_about_designs
-    }
-
     /// For each quality bound, adds facts to the problem for the designs that meet it. A design that lacks an
-    /// estimate still meets the bound if no design of the required functions that it solves has an estimate of the
-    /// attribute. Adds the values for changes of designs that the bindings do not add.
+    /// estimate also has the fact if no design of the required functions that it solves has an estimate of the attribute;
+    /// the explicit form does not test such facts. Adds the values for changes of designs that the bindings do not add.
     pub(super) fn fill(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
         self.fill_changes(problem, designs);
         for quality in self.quality() {
@@ -688,4 +698,13 @@ fn total(mut parts: Vec<Expression>, span: Span) -> Expression {
         1 => parts.remove(0),
         _ => Expression::Operation(Arithmetic::Add, parts, span),
     }
+}
+
+/// Returns `true` if a condition has an atom of one of the predicates.
+fn is_about(condition: &Condition, predicates: &BTreeSet<Name>) -> bool {
+    let mut is_about = false;
+    condition.walk(&mut |node| {
+        is_about |= node.atom().is_some_and(|atom| predicates.contains(&atom.predicate.name));
+    });
+    is_about
 }

@@ -1,6 +1,8 @@
 //! Names that co-adaptation adds to the user's domain: tells them apart from the user's names, and rewrites
 //! conditions with them for display.
 
+use std::collections::BTreeSet;
+
 use pddl::ast::Name;
 
 use super::{CoAdaptation, meets};
@@ -24,6 +26,12 @@ impl CoAdaptation {
     }
 
     pub(crate) fn is_added(&self, name: &Name) -> bool {
-        self.predicates().into_iter().chain(self.functions()).any(|own| own.identifier.name == *name)
+        self.added().contains(name)
+    }
+
+    /// Returns the predicates and functions that only the explicit form has.
+    pub(super) fn added(&self) -> BTreeSet<Name> {
+        let declarations = self.predicates().into_iter().chain(self.functions());
+        declarations.map(|declaration| declaration.identifier.name).collect()
     }
 }
