@@ -284,11 +284,7 @@ impl Coadaptation {
             );
             problems.push(Message::error("M127", text));
         }
-        let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
-        if is_timed || !problem.constraints.is_empty() || !mission.domain().constraints.is_empty() {
-            let text = "a process of places has no constraints, preferences or timed initial literals";
-            problems.push(Message::error("M127", text));
-        }
+        problems.extend(conditions_on_time(mission.domain(), problem));
         let Some(goal) = goal.filter(|_| problems.is_empty()) else { return Err(problems.into()) };
         let mut places: Vec<String> = vec![start.clone(), goal.clone()];
         let mut designs: Vec<String> = vec![configured.clone()];
@@ -443,6 +439,15 @@ pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {
         "a process has at most {MAX_PLACES} places and {MAX_CONFIGURATIONS} configurations, not {places} and {configurations}"
     );
     Err(vec![Message::error("M127", text)].into())
+}
+
+/// Returns an error if the domain or the problem has constraints, preferences or timed initial literals, which the process
+/// does not represent.
+fn conditions_on_time(domain: &Domain, problem: &Problem) -> Option<Message> {
+    let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
+    let is_refused = is_timed || !problem.constraints.is_empty() || !domain.constraints.is_empty();
+    let text = "a process of places has no constraints, preferences or timed initial literals";
+    is_refused.then(|| Message::error("M127", text))
 }
 
 /// Sorts names by the part before the first digit (shorter parts first); with equal parts, `l2` precedes `l10`.
