@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use metaplan::mapek::{Answer, Loop, Observation, Settings};
+use metaplan::mapek::{Answer, Loop, Observation};
 use metaplan::setup::Setup;
 use num_rational::BigRational;
 
