@@ -410,13 +410,16 @@ impl<S: Store> Runner<S> {
         // If the robot was suspended, this decision has retired it.
         self.is_suspended &= !is_decided;
         self.is_kept &= !is_decided;
+        let was_pending = self.pending.is_some();
         let mut last = None;
         if let Some(Loaded { robot, .. }) = &self.loaded {
             let planning = &self.shared.counts.planning;
             self.pending =
                 robot.is_pending().then(|| self.pending.take().unwrap_or_else(|| Count::new(planning)));
             self.search.update(self.pending.as_ref().map(|_| robot.question()));
-            last = is_decided.then_some(robot.event);
+            // The plan may be in a decision of another worker, or in an unacknowledged one. Its event was kept until now.
+            let is_planned = was_pending && self.pending.is_none();
+            last = (is_decided || is_planned).then_some(robot.event);
         }
         if self.pending.is_none() {
             self.search.reset();
@@ -633,5 +636,26 @@ mod tests {
         let outcome = runner.decide(&again).await;
         let refused = Undecided::Refused(Refused::EnrolledAlready);
         assert!(matches!(outcome, Outcome::Undecided(reason) if reason == refused));
+    }
+
+    #[tokio::test]
+    async fn an_event_whose_plan_is_in_a_decision_of_another_worker_is_discarded() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let missions = missions();
+        let mut runner = runner(log(folder.path()), missions.clone(), Settings::default());
+        enrol(&mut runner, "ugv", &missions).await;
+        runner.register(Some(1), Outcome::Known);
+        runner.discard().await;
+        assert!(runner.pending.is_some() && runner.obsolete == 0);
+        let enrolment = Stored { sequence: 1, ..later(r#"{"event": "enrol", "mission": "ugv"}"#) };
+        let planned = Robot::default().decide(&enrolment, &missions).expect("it is not refused");
+        let payload = serde_json::to_vec(&planned).expect("plain data");
+        let message = Message { subject: "0.r", id: "", after: None, payload: &payload };
+        runner.shared.store.append(Stream::Decisions, message).await.expect("it can be written");
+        // The plan of this worker is rejected.
+        runner.loaded = None;
+        let outcome = runner.start_planning().await;
+        runner.register(None, outcome);
+        assert!(runner.pending.is_none() && runner.obsolete == 1);
     }
 }
