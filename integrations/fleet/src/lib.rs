@@ -6,11 +6,11 @@
 //! streams are persistent. The last decision about a robot contains its state. A worker owns partitions and runs the
 //! [loops](metaplan::mapek::Loop) of their robots.
 //!
-//! Every event that is not refused leads to exactly one decision, unless the robot is suspended because it
-//! cannot continue. Further decisions may add the plan, or be about the passing of time. A decision is appended
-//! only if the robot's previous decision is still the last one (compare-and-set on the last sequence of the
-//! subject). So two workers that own a partition at the same time cannot both decide an event: the division of
-//! partitions is for efficiency, and the chain of decisions guarantees correctness.
+//! Every event that is not refused leads to exactly one decision, unless the robot is suspended because it cannot
+//! continue. A further decision may add the plan. A decision is appended only if the robot's previous decision is
+//! still the last one (compare-and-set on the last sequence of the subject). So two workers that own a partition at
+//! the same time cannot both decide an event: the division of partitions is for efficiency, and the chain of
+//! decisions guarantees correctness.
 //!
 //! ```
 #![doc = include_str!("../examples/directory.rs")]
@@ -18,7 +18,7 @@
 //!
 //! - [`store`]: the interface of a log, which NATS JetStream and a local directory implement.
 //! - [`wire`]: data formats of messages and of stored values, and syntax of subjects.
-//! - [`robot`]: a single robot, which turns events and timers into decisions, without clock and network.
+//! - [`robot`]: a single robot, which turns events into decisions, without clock and network.
 //! - [`missions`]: current and former versions of missions; [`ids`]: recognition of repeated messages.
 //! - [`partition`]: the robots of a partition: order, loading, discarding of handled events.
 //! - [`worker`]: division of partitions among workers, metrics, shutdown.

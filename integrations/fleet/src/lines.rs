@@ -21,9 +21,13 @@ use serde_json::{Map, Value};
 use tokio::io::{AsyncBufReadExt as _, BufReader, stdin};
 use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{mpsc, watch};
+use tokio::task::JoinHandle;
 
 /// Maximum number of input lines of a robot that are read but not stored.
 const AHEAD: usize = 1024;
+
+/// Maximum time for which the program writes its last decisions after its worker has ended.
+const MAX_WRITING: Duration = Duration::from_secs(5);
 
 fn fault(fault: impl Display) -> Message {
     Message::error("N312", format!("the log cannot be used: {fault}"))
@@ -244,11 +248,13 @@ async fn run(
     order.send_replace(true);
     // A worker has no result to check.
     let _ = working.await;
+    let is_written = write_last(&store, &writing, &writer.written);
+    let result = tokio::time::timeout(MAX_WRITING, is_written).await.unwrap_or(Ok(()));
     writing.abort();
     if let Ok(outcome) = writing.await {
         outcome?;
     }
-    fed
+    fed.and(result)
 }
 
 /// Returns the warning for a notice, or for notices that were lost because standard error was not read in time.
@@ -273,14 +279,38 @@ async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) ->
     let counts = &shared.counts;
     // Events are checked first: once all of them are handled, their decisions are stored.
     for (stream, positions) in [(Stream::Events, &counts.seen), (Stream::Decisions, written)] {
-        for partition in 0..shared.store.partitions() {
-            let end = shared.store.end(stream, partition).await.map_err(fault)?;
-            let positions = positions.lock().unwrap_or_else(PoisonError::into_inner);
-            if positions.get(&partition).copied().unwrap_or_default() < end {
-                return Ok(false);
-            }
+        if !has_reached(&shared.store, stream, positions).await?
+            || counts.waiting.load(Ordering::SeqCst) + counts.planning.load(Ordering::SeqCst) > 0
+        {
+            return Ok(false);
         }
-        if counts.waiting.load(Ordering::SeqCst) + counts.planning.load(Ordering::SeqCst) > 0 {
+    }
+    Ok(true)
+}
+
+/// Waits until all stored decisions are written, or `writing` has ended. A further program begins after the stored
+/// decisions, so it would not write them.
+async fn write_last<T>(
+    store: &Local,
+    writing: &JoinHandle<T>,
+    written: &Mutex<BTreeMap<u32, u64>>,
+) -> Result<(), Message> {
+    while !writing.is_finished() && !has_reached(store, Stream::Decisions, written).await? {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    Ok(())
+}
+
+/// Returns `true` if a position has reached the end of the stream in each partition.
+async fn has_reached(
+    store: &Local,
+    stream: Stream,
+    positions: &Mutex<BTreeMap<u32, u64>>,
+) -> Result<bool, Message> {
+    for partition in 0..store.partitions() {
+        let end = store.end(stream, partition).await.map_err(fault)?;
+        let positions = positions.lock().unwrap_or_else(PoisonError::into_inner);
+        if positions.get(&partition).copied().unwrap_or_default() < end {
             return Ok(false);
         }
     }
@@ -385,6 +415,31 @@ mod tests {
             outcome = writer.run() => panic!("it has ended: {outcome:?}"),
             () = is_written => {}
         }
+    }
+
+    #[tokio::test]
+    async fn the_last_decisions_are_written_before_the_end() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = Local::open(folder.path(), 2, 8, Duration::from_secs(1))
+            .unwrap_or_else(|message| panic!("{message}"));
+        let message = Appended { subject: "1.r", id: "", after: None, payload: b"a decision" };
+        let receipt = store.append(Stream::Decisions, message).await.expect("it is our own directory");
+        let written = Mutex::new(BTreeMap::new());
+        let writing = tokio::spawn(std::future::pending::<()>());
+        let positions = || written.lock().unwrap_or_else(PoisonError::into_inner);
+        let write = async {
+            tokio::time::sleep(Duration::from_millis(100)).await;
+            positions().insert(1, receipt.sequence);
+        };
+        let end = async {
+            write_last(&store, &writing, &written).await.unwrap_or_else(|message| panic!("{message:?}"));
+            positions().get(&1).copied()
+        };
+        assert_eq!(tokio::join!(end, write).0, Some(receipt.sequence));
+        // It does not wait for a task that has ended, for example because standard output is closed.
+        positions().clear();
+        writing.abort();
+        write_last(&store, &writing, &written).await.unwrap_or_else(|message| panic!("{message:?}"));
     }
 
     #[tokio::test]

@@ -1,7 +1,7 @@
-//! State of a single robot, which turns an event, or the passing of time, into a decision. It has no network and takes
-//! the time from the events and from its caller. Equal events at equal times therefore lead to equal decisions of
-//! [`Robot::decide`], except for plans whose search was ended by a time limit. Decisions of [`Robot::finish`] and
-//! [`Robot::plan`] also depend on the plans that their caller provides.
+//! State of a single robot, which turns an event into a decision. It has no network and takes the time from the
+//! events. Equal events at equal times therefore lead to equal decisions of [`Robot::decide`], except for plans whose
+//! search was ended by a time limit. Decisions of [`Robot::finish`] and [`Robot::plan`] also depend on the plans that
+//! their caller provides.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,7 +20,7 @@ use crate::wire::{Decided, Migration, SafePoint, State};
 pub struct Robot {
     /// Sequence number of the last event that was decided.
     pub event: u64,
-    /// Time between enrolment and the last event or timer that was decided, in microseconds.
+    /// Time between enrolment and the last event that was decided, in microseconds.
     now: u64,
     /// State after the last decision. Its snapshot is used only while the loop is [`Control::Stored`].
     state: State,
@@ -223,32 +223,6 @@ impl Robot {
             }
         }
         Ok(self.deliberate(search))
-    }
-
-    /// Runs the first phase of a decision that `passed` has passed since the loop's last event or timer, without an event.
-    /// It has the number of the last event.
-    ///
-    /// # Errors
-    /// As for [`Robot::decide`].
-    pub fn begin_timer(&mut self, passed: Duration, missions: &Missions) -> Result<Begun, Undecided> {
-        let name = self.state.mission.clone().ok_or(Refused::NotEnrolled)?;
-        let control = self.load(missions)?;
-        let now = control.beliefs().now().saturating_add(passed);
-        let answers = control.react(&Observation::timer(), now);
-        let now = u64::try_from(now.as_micros()).unwrap_or(u64::MAX);
-        let decided = Decided { event: self.event, now, timer: true, ..Decided::default() };
-        let mut search = Search { decided, answers, id: None };
-        self.migrate(&name, missions, &mut search)?;
-        Ok(self.deliberate(search))
-    }
-
-    /// Returns the time from the loop's last event or timer to the next [timer](Self::begin_timer). Returns `None` if the
-    /// loop is not loaded or nothing is scheduled, or if an event stated its time: time then passes with events only, as
-    /// in `metaplan run`.
-    pub fn pause(&self) -> Option<Duration> {
-        let Control::Loaded(control, _) = &self.control else { return None };
-        let due = control.due().filter(|_| !control.beliefs().has_times())?;
-        Some(due.saturating_sub(control.beliefs().now()))
     }
 
     /// Completes a decision with the plans that were found in the meantime. Without usable plans, the decision has only

@@ -75,7 +75,7 @@ pub struct Decided {
     pub format: Format,
     /// Sequence number of the event in the stream of events.
     pub event: u64,
-    /// Time between enrolment and event or timer in microseconds.
+    /// Time between enrolment and event in microseconds.
     pub now: u64,
     /// Answers in the format of `metaplan run`.
     pub answers: Vec<Value>,
@@ -100,10 +100,6 @@ pub struct Decided {
     /// after several searches that were cancelled.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub late: bool,
-    /// `true` if the decision is about the passing of time: something was due, for example because a sensor was silent or
-    /// a deadline had passed. `event` is then the event of the previous decision.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub timer: bool,
     /// Name of the worker that has decided.
     pub worker: String,
     /// State of the robot after the event: JSON, compressed with LZ4, as base64.

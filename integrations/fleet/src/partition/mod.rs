@@ -7,9 +7,6 @@
 //! the reaction is published without a plan. Each further event is handled in the meantime. If it changes the planning
 //! problem, the search starts again. A further decision contains the plan.
 //!
-//! If something of a robot in memory is due without an event, for example because a sensor is silent, a decision about the
-//! passing of time follows.
-//!
 //! The state of a robot is part of its last decision. A decision is appended only if the robot's last decision has the
 //! expected sequence number, so only one of two workers can decide an event. A new owner of a partition reads the events
 //! that are still in the log, loads the last decision of their robots, and continues with the first undecided event.
@@ -47,7 +44,7 @@ pub struct Settings {
     pub patience: Duration,
     /// Maximum number of robots in memory. Others are loaded from their last decision when they have events, and removed
     /// afterwards. Robots that are handling events may exceed this number. A robot is also removed ten minutes after its
-    /// last event, timer or plan, unless it has another timer. A robot that is removed has no timers.
+    /// last event or plan.
     pub warm: usize,
     /// Number of handled events after which the events of a robot are discarded.
     pub discard_every: usize,

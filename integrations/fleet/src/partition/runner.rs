@@ -16,11 +16,8 @@ use crate::robot::{Begun, Refused, Robot, Undecided, is_retirement};
 use crate::store::{Fault, Message, Store, Stored, Stream};
 use crate::wire::{Address, Decided};
 
-/// Time without an event, a timer or a plan after which a robot is removed from memory.
+/// Time without an event or a plan after which a robot is removed from memory.
 const MAX_IDLE: Duration = Duration::from_secs(600);
-
-/// Minimum time between an event or a timer and the next timer.
-const MIN_PAUSE: Duration = Duration::from_millis(10);
 
 /// Reason for a suspension: work on the robot has panicked, or the thread of a search could not be started.
 const PANICKED: &str = "its loop has panicked";
@@ -44,10 +41,6 @@ impl Drop for Count {
 struct Loaded {
     robot: Box<Robot>,
     chain: u64,
-    /// Time at which the last event or timer was decided, or, if this worker has decided none, the robot was loaded. The
-    /// pause to the next timer is measured from it. An event may have waited before, so a timer can be late, but is never
-    /// too early.
-    clock: Instant,
     /// Counts the loaded robots of the worker.
     _count: Count,
 }
@@ -74,9 +67,6 @@ fn panicked() -> Outcome {
 /// The plans of a search and the new estimate of the duration of a search. `None` if the search has panicked or could
 /// not be started.
 type Plans = Option<(Thoughts, Duration)>;
-
-/// A decision and the search that continues after it, or the reason why there is no decision.
-type Decision = Result<(Decided, Option<Planning>), Outcome>;
 
 /// A search for a plan that continues after the decision.
 struct Planning {
@@ -108,7 +98,7 @@ pub(super) struct Runner<S> {
     /// first of them.
     obsolete: usize,
     since: Option<Instant>,
-    /// Time of the last event, timer or plan.
+    /// Time of the last event or plan.
     used: Instant,
 }
 
@@ -143,7 +133,7 @@ impl<S: Store> Runner<S> {
                 continue;
             }
             let discard_at = self.since.map(|since| since + self.shared.settings.discard_within);
-            let (unload_at, due_at) = (self.unload_at(), self.due_at());
+            let unload_at = self.unload_at();
             let decided = self.loaded.as_ref().map_or(0, |loaded| loaded.robot.event);
             let Self { inbox, plans, shared, subject, .. } = &mut *self;
             tokio::select! {
@@ -154,7 +144,6 @@ impl<S: Store> Runner<S> {
                 event = inbox.next(&shared.store, subject, decided) => if let Some(event) = event {
                     self.handle(event).await;
                 },
-                () = until(due_at) => self.elapse().await,
                 () = until(unload_at) => self.loaded = None,
             }
             let is_unknown = self.loaded.as_ref().is_some_and(|loaded| loaded.robot.mission().is_none());
@@ -188,16 +177,9 @@ impl<S: Store> Runner<S> {
     }
 
     /// Returns the time at which the robot is removed from memory. A robot with a missing plan stays, because plans for a
-    /// loop that was removed cannot be used. So does a robot with a timer.
+    /// loop that was removed cannot be used.
     fn unload_at(&self) -> Option<Instant> {
-        let is_removable = self.loaded.is_some() && self.is_idle() && self.due_at().is_none();
-        is_removable.then(|| self.used + MAX_IDLE)
-    }
-
-    /// Returns the time of the robot's next timer.
-    fn due_at(&self) -> Option<Instant> {
-        let Loaded { robot, clock, .. } = self.loaded.as_ref()?;
-        clock.checked_add(robot.pause()?.max(MIN_PAUSE))
+        self.loaded.as_ref().filter(|_| self.is_idle()).map(|_| self.used + MAX_IDLE)
     }
 
     /// Returns `true` if nothing has to be kept in memory.
@@ -229,15 +211,24 @@ impl<S: Store> Runner<S> {
                 return Outcome::Known;
             }
             let begun = Instant::now();
-            let copy = event.clone();
-            let decision = self.decision(move |robot, missions| robot.begin(&copy, missions)).await;
+            let decision = self.decision(event).await;
             metrics::histogram!("metaplan_fleet_decision_seconds").record(begun.elapsed());
-            let outcome = self.apply(decision, Some(event.time)).await;
+            let (outcome, planning) = match decision {
+                Ok((decided, planning)) => {
+                    if decided.migrated {
+                        // A search for the former version of the mission has no use.
+                        self.search.update(None);
+                    }
+                    (self.publish(decided, Some(event.time)).await, planning)
+                }
+                Err(outcome) => (outcome, None),
+            };
             // The log compares the chain only with decisions. A refusal by an outdated state would discard the event.
             let is_refused = matches!(outcome, Outcome::Undecided(Undecided::Refused(_)));
             if is_refused && is_cached && !self.is_last().await {
                 self.loaded = None;
             } else if !matches!(outcome, Outcome::Outdated) {
+                self.follow(planning);
                 return outcome;
             }
             // Another worker has decided, or an unacknowledged attempt has succeeded. The robot is loaded again to find
@@ -248,51 +239,17 @@ impl<S: Store> Runner<S> {
         Outcome::Known
     }
 
-    /// Decides that time has passed, because something of the robot is due.
-    async fn elapse(&mut self) {
-        let Some(Loaded { clock, .. }) = &self.loaded else { return };
-        let passed = clock.elapsed();
-        let decision = self.decision(move |robot, missions| robot.begin_timer(passed, missions)).await;
-        let outcome = self.apply(decision, None).await;
-        self.register(None, outcome);
-        self.used = Instant::now();
-    }
-
-    /// Publishes a decision about an event, which was stored at `time`, or about the passing of time, and follows the
-    /// search that continues.
-    async fn apply(&mut self, decision: Decision, time: Option<u64>) -> Outcome {
-        let (decided, planning) = match decision {
-            Ok(decision) => decision,
-            Err(outcome) => return outcome,
-        };
-        if decided.migrated {
-            // A search for the former version of the mission has no use.
-            self.search.update(None);
-        }
-        let outcome = self.publish(decided, time).await;
-        if let Some(Loaded { clock, .. }) = &mut self.loaded {
-            *clock = Instant::now();
-        }
-        if !matches!(outcome, Outcome::Outdated) {
-            self.follow(planning);
-        }
-        outcome
-    }
-
     /// Returns `true` if the robot's last decision is the loaded one.
     async fn is_last(&mut self) -> bool {
         let last = persist(|| self.shared.store.last(Stream::Decisions, &self.subject)).await;
         last.map_or(0, |last| last.sequence) == self.load().await.chain
     }
 
-    /// Returns the decision that `begin` begins, and the search that continues if the decision lacks a plan.
-    async fn decision(
-        &mut self,
-        begin: impl FnOnce(&mut Robot, &Missions) -> Result<Begun, Undecided> + Send + 'static,
-    ) -> Decision {
-        let may_search = self.plans.is_empty();
+    /// Returns the decision about an event, and the search that continues if the decision lacks a plan.
+    async fn decision(&mut self, event: &Stored) -> Result<(Decided, Option<Planning>), Outcome> {
+        let (event, may_search) = (event.clone(), self.plans.is_empty());
         let begin = move |robot: &mut Robot, missions: &Missions| {
-            let begun = begin(robot, missions);
+            let begun = robot.begin(&event, missions);
             let thinker = match &begun {
                 Ok(Begun::Search(_)) if may_search => robot.thinker(missions).ok().flatten(),
                 _ => None,
@@ -385,8 +342,7 @@ impl<S: Store> Runner<S> {
             let robot = last.map_or_else(Robot::default, |last| {
                 Decided::parse(&last.payload).map_or_else(Robot::unreadable, Robot::restore)
             });
-            let (clock, _count) = (Instant::now(), Count::new(&self.shared.counts.robots));
-            Loaded { robot: Box::new(robot), chain, clock, _count }
+            Loaded { robot: Box::new(robot), chain, _count: Count::new(&self.shared.counts.robots) }
         };
         self.loaded.insert(loaded)
     }
@@ -448,20 +404,22 @@ impl<S: Store> Runner<S> {
         outcome
     }
 
-    /// Registers the outcome of an event, or, without a sequence number, of a timer, or of the start or the end of
-    /// planning.
+    /// Registers the outcome of an event, or, without a sequence number, of the start or the end of planning.
     fn register(&mut self, sequence: Option<u64>, outcome: Outcome) {
         let is_decided = matches!(outcome, Outcome::Decided);
         // If the robot was suspended, this decision has retired it.
         self.is_suspended &= !is_decided;
         self.is_kept &= !is_decided;
+        let was_pending = self.pending.is_some();
         let mut last = None;
         if let Some(Loaded { robot, .. }) = &self.loaded {
             let planning = &self.shared.counts.planning;
             self.pending =
                 robot.is_pending().then(|| self.pending.take().unwrap_or_else(|| Count::new(planning)));
             self.search.update(self.pending.as_ref().map(|_| robot.question()));
-            last = is_decided.then_some(robot.event);
+            // The plan may be in a decision of another worker, or in an unacknowledged one. Its event was kept until now.
+            let is_planned = was_pending && self.pending.is_none();
+            last = (is_decided || is_planned).then_some(robot.event);
         }
         if self.pending.is_none() {
             self.search.reset();
@@ -678,5 +636,26 @@ mod tests {
         let outcome = runner.decide(&again).await;
         let refused = Undecided::Refused(Refused::EnrolledAlready);
         assert!(matches!(outcome, Outcome::Undecided(reason) if reason == refused));
+    }
+
+    #[tokio::test]
+    async fn an_event_whose_plan_is_in_a_decision_of_another_worker_is_discarded() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let missions = missions();
+        let mut runner = runner(log(folder.path()), missions.clone(), Settings::default());
+        enrol(&mut runner, "ugv", &missions).await;
+        runner.register(Some(1), Outcome::Known);
+        runner.discard().await;
+        assert!(runner.pending.is_some() && runner.obsolete == 0);
+        let enrolment = Stored { sequence: 1, ..later(r#"{"event": "enrol", "mission": "ugv"}"#) };
+        let planned = Robot::default().decide(&enrolment, &missions).expect("it is not refused");
+        let payload = serde_json::to_vec(&planned).expect("plain data");
+        let message = Message { subject: "0.r", id: "", after: None, payload: &payload };
+        runner.shared.store.append(Stream::Decisions, message).await.expect("it can be written");
+        // The plan of this worker is rejected.
+        runner.loaded = None;
+        let outcome = runner.start_planning().await;
+        runner.register(None, outcome);
+        assert!(runner.pending.is_none() && runner.obsolete == 1);
     }
 }

@@ -9,7 +9,6 @@ mod hostile;
 mod planning;
 mod program;
 mod scripts;
-mod timers;
 mod versions;
 
 use std::collections::{BTreeMap, BTreeSet};

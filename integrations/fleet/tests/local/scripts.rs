@@ -52,8 +52,7 @@ pub(super) fn assert_replayed(
     decided: &[Decided],
     sequences: &[u64],
 ) -> usize {
-    let has_event = |made: &&Decided| !made.planned && !made.timer;
-    let made: Vec<u64> = decided.iter().filter(has_event).map(|made| made.event).collect();
+    let made: Vec<u64> = decided.iter().filter(|made| !made.planned).map(|made| made.event).collect();
     assert_eq!(made, sequences, "{robot}: each event once, in order");
     let Setup { mission, settings, .. } = setup(mission);
     let initial = Loop::new(mission, settings).unwrap_or_else(|errors| panic!("{errors}"));
@@ -62,9 +61,7 @@ pub(super) fn assert_replayed(
     let (mut waiting, mut compared) = (0, 0);
     for (number, made) in decided.iter().enumerate() {
         let mut answers = Vec::new();
-        if made.timer {
-            answers.extend(control.react(&Observation::timer(), Duration::from_micros(made.now)));
-        } else if !made.planned {
+        if !made.planned {
             let event = events.next().expect("there are as many events");
             // The first event enrols the robot.
             if number > 0 {
