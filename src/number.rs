@@ -17,8 +17,11 @@ const DECIMALS: u32 = 6;
 /// Maximum number of significant digits of a reported value that is not rounded.
 const EXACT_DIGITS: usize = 9;
 
-/// Maximum number of decimals of a reported value. Without a limit, noise near zero would be kept.
+/// Maximum number of decimals of a reported value that is not rounded.
 const MAX_DECIMALS: u32 = 15;
+
+/// Maximum number of decimals to which a long value is rounded. The noise of sums of floating-point numbers has more.
+const MAX_ROUNDED_DECIMALS: u32 = 9;
 
 /// Maximum number of bits of the denominator of a value that [`bounded`] does not round.
 const MAX_DENOMINATOR_BITS: u64 = 64;
@@ -45,15 +48,15 @@ pub(crate) fn rounded(value: &BigRational) -> BigRational {
 }
 
 /// Rounds a reported decimal to six decimals, or to six significant digits if they have more decimals, but at most to
-/// [`MAX_DECIMALS`]. Values of at most nine significant digits and so many decimals are not rounded. Floating-point
-/// values of a robot would otherwise make the planner's integers huge.
+/// [`MAX_ROUNDED_DECIMALS`]. Values of at most [`EXACT_DIGITS`] significant digits and [`MAX_DECIMALS`] decimals are not
+/// rounded. Floating-point values of a robot would otherwise make the planner's integers huge.
 pub(crate) fn reported(value: &BigRational) -> BigRational {
     let whole = |power| BigRational::from_integer(BigInt::from(10).pow(power));
-    let (shift, greatest) = (BigRational::from_integer(scale_of(value)), whole(MAX_DECIMALS));
-    if shift <= greatest && (value * shift).to_integer().abs().to_string().len() <= EXACT_DIGITS {
+    let shift = BigRational::from_integer(scale_of(value));
+    if shift <= whole(MAX_DECIMALS) && (value * shift).to_integer().abs().to_string().len() <= EXACT_DIGITS {
         return value.clone();
     }
-    let (mut scale, least) = (whole(DECIMALS), whole(DECIMALS - 1));
+    let (mut scale, least, greatest) = (whole(DECIMALS), whole(DECIMALS - 1), whole(MAX_ROUNDED_DECIMALS));
     while value.abs() * &scale < least && scale < greatest {
         scale *= whole(1);
     }
@@ -132,7 +135,9 @@ mod tests {
             ("4e-15", "0.000000000000004"),
             ("4e-16", "0"),
             ("1.2246467991473532e-16", "0"),
-            ("1.2246467991473532e-12", "0.000000000001225"),
+            ("1.2246467991473532e-12", "0"),
+            // 100.1 - 100 - 0.1 with floating-point numbers.
+            ("-5.689893001203927e-15", "0"),
             ("0.30000000000000004", "0.3"),
             ("0.30000001192092896", "0.3"),
             ("-0.00012345678901234", "-0.000123457"),

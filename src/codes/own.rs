@@ -107,7 +107,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M127",
         "The mission cannot be represented as a decision process.",
-        "It has too many states, which are enumerated, or timed initial literals. Or its problem defines places, but has several places at the start, constraints, or a goal that is not just one place.",
+        "It has too many states, which are enumerated, or timed initial literals. Or its problem defines places, but has several places or configurations at the start, constraints, or a goal that is not just one place.",
         "Use fewer places, designs or values, and one place as the goal.",
     ],
     [

@@ -441,12 +441,12 @@ pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {
     Err(vec![Message::error("M127", text)].into())
 }
 
-/// Returns an error if the domain or the problem has constraints, preferences or timed initial literals, which the process
-/// does not represent.
+/// Returns an error if the domain or the problem has constraints or timed initial literals, which the process does not
+/// represent.
 fn conditions_on_time(domain: &Domain, problem: &Problem) -> Option<Message> {
     let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     let is_refused = is_timed || !problem.constraints.is_empty() || !domain.constraints.is_empty();
-    let text = "a process of places has no constraints, preferences or timed initial literals";
+    let text = "a process of places has no constraints or timed initial literals";
     is_refused.then(|| Message::error("M127", text))
 }
 

@@ -2,10 +2,12 @@
 //!
 //! The explanation is sought if the mission has no plan, but would have one with all designs of the
 //! knowledge base available. Designs are made available one by one, and a design stays available if there is still
-//! no plan. The remaining set of designs is minimal: with any one of them available,
-//! there would be a plan. In PLANTA's form, actions can make a design unavailable, so all designs are tried if those that are
-//! unavailable at the start are not sufficient. This is the deletion-based search for a minimal unsatisfiable core [1],
-//! with the planner in place of the SAT solver; its proofs hold for plans of every length.
+//! no plan. The remaining set of designs is minimal: with any one of them available, there would be a plan. This is the
+//! deletion-based search for a minimal unsatisfiable core [1], with the planner in place of the SAT solver; its proofs
+//! hold for plans of every length.
+//!
+//! In PLANTA's form, actions can make a design unavailable, so all designs are tried if those that are unavailable at the
+//! start are not sufficient.
 //!
 //! [1] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
 

@@ -261,10 +261,10 @@ impl Machine {
         format!("{function} answers again")
     }
 
-    /// Reports designs as realisable again once their retry delay is over. Removes grants once their period is over; if another mode was reported in the meantime,
-    /// requests the current mode of the function. In the states EXECUTE and DEGRADED, also passes a due tick to the
-    /// loop: the filters of the loop delay the report that a component works again until a later line, and an unchanged
-    /// status produces no line.
+    /// Reports designs as realisable again once their retry delay is over. Removes grants once their period is over; if
+    /// another mode was reported in the meantime, requests the current mode of the function. In the states EXECUTE and
+    /// DEGRADED, also passes a due tick to the loop: the filters of the loop delay the report that a component works
+    /// again until a later line, and an unchanged status produces no line.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();
