@@ -326,7 +326,7 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             round_began = time.monotonic()
             left = None if timeout is None else max(timeout - (round_began - began), 0.0)
             is_last = left is not None and left <= share
-            limit = left if is_last else share
+            limit = share if left is None else min(left, share)
             result = self._answer(problem, limit, output_stream)
             # Without a metric, all plans are equally good.
             is_best = result.plan is not None and not problem.quality_metrics
