@@ -535,13 +535,11 @@ fn documents_do_not_import_themselves_by_name() {
             assert!(matches!(&errors[..], [Error::UnresolvedImport { .. }]), "{errors:?}");
         }
     }
-    // A copy of the document, for example an installed one of another version, is not the import either.
-    for copy in [text.clone(), format!("{text}\n")] {
-        let files = directory(&[("kb/robot.owl", &text), ("share/robot.owl", &copy)]);
-        let options = ReadOptions { directories: vec![files.path().to_owned()], ..ReadOptions::default() };
-        let errors = read_files(&[files.path().join("kb/robot.owl")], &options).expect_err("unresolved");
-        assert!(matches!(&errors[..], [Error::UnresolvedImport { .. }]), "{errors:?}");
-    }
+    // A copy of the document, for example an installed one, is not the import either.
+    let files = directory(&[("kb/robot.owl", &text), ("share/robot.owl", &text)]);
+    let options = ReadOptions { directories: vec![files.path().to_owned()], ..ReadOptions::default() };
+    let errors = read_files(&[files.path().join("kb/robot.owl")], &options).expect_err("unresolved");
+    assert!(matches!(&errors[..], [Error::UnresolvedImport { .. }]), "{errors:?}");
     let url = "https://raw.githubusercontent.com/meta-control/mc_mdl_tomasys/ros2/owl/tomasys.owl";
     let files = directory(&[("tomasys.owl", &importing("http://me/tomasys", &[url]))]);
     let ontology =

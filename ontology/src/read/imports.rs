@@ -283,22 +283,20 @@ fn declared_iri(path: &Path) -> Option<String> {
 }
 
 /// Returns the file that fits an import best: by IRI, otherwise by name. By name, a file imports neither itself nor a
-/// copy or another version of itself, which declares the same IRI.
+/// copy of itself.
 fn best_match(import: &str, importer: Option<&Path>, files: &[OntologyFile]) -> Option<PathBuf> {
     let by_iri: Vec<_> =
         files.iter().filter(|file| file.iri.as_deref().is_some_and(|iri| same_iri(iri, import))).collect();
     let name = last_segment(import);
-    let is_importer = |file: &OntologyFile| {
+    let is_importer = |path: &Path| {
         importer.is_some_and(|importer| {
-            file.path.canonicalize().is_ok_and(|path| path == importer)
-                || matches!((regular_file(&file.path), regular_file(importer)), (Ok(a), Ok(b)) if a == b)
-                || matches!((&file.iri, declared_iri(importer)), (Some(a), Some(b)) if same_iri(a, &b))
+            path.canonicalize().is_ok_and(|path| path == importer)
+                || matches!((regular_file(path), regular_file(importer)), (Ok(a), Ok(b)) if a == b)
         })
     };
-    let fits = |file: &OntologyFile| {
-        file.path.file_name().is_some_and(|file_name| file_name == name) && !is_importer(file)
-    };
-    let by_name = || files.iter().filter(|file| fits(file));
+    let fits =
+        |path: &Path| path.file_name().is_some_and(|file_name| file_name == name) && !is_importer(path);
+    let by_name = || files.iter().filter(|file| fits(&file.path));
     let matching: Vec<_> = if by_iri.is_empty() { by_name().collect() } else { by_iri };
     let segments: Vec<&str> = import.split('/').filter(|segment| !segment.is_empty()).collect();
     let shared = |file: &OntologyFile| {
