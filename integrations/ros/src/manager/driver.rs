@@ -299,7 +299,7 @@ impl Driver {
                 Output::Reply(number, success) => self.robot.reply(number, success),
                 Output::Perform(number, call) => self.robot.perform(number, call),
                 Output::Stop(number) => self.robot.stop(number),
-                Output::Await(number, time) => self.robot.await_end(number, time),
+                Output::Await(wait, time) => self.robot.await_end(wait, time),
                 Output::Plan(plan) => self.robot.plan(&plan),
                 Output::Event(event) => self.robot.event(&event),
                 Output::Warn(text) => self.node.warn_once(&text),

@@ -415,11 +415,11 @@ impl Robot {
     }
 
     /// Reports after a real time that an action should have ended. Simulated time may be paused.
-    pub(super) fn await_end(&self, number: u64, time: Duration) {
+    pub(super) fn await_end(&self, wait: u64, time: Duration) {
         let inputs = self.inputs.clone();
         smol::spawn(async move {
             Timer::after(time).await;
-            let _ = inputs.send(Input::Overdue(number));
+            let _ = inputs.send(Input::Overdue(wait));
         })
         .detach();
     }

@@ -14,14 +14,14 @@ use crate::interfaces::suave_msgs::action::{
     SpiralSearchFeedback, SpiralSearchGoal, SpiralSearchResult,
 };
 use crate::interfaces::{Action, Service};
-use crate::node::{Accepted, ActionCaller, CallError, Caller, GoalEnd, Node, Pursued};
+use crate::node::{Accepted, ActionCaller, Caller, GoalEnd, Node, Pursued};
 use crate::perform::{Call, End, Perform, Performance, Progress, Running};
 use crate::performer::{feedback, part};
 
 const SERVER_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Time to wait for the answer to a goal whose action is cancelled. A goal that is accepted later is cancelled, too, but
-/// its end is not awaited.
+/// Time to wait for the answer to a goal whose action is cancelled. A goal without an answer in time is cancelled, too,
+/// but its end is not awaited.
 const CANCELED_WAIT: Duration = Duration::from_secs(1);
 
 /// Mapping of an action of a plan to goals, feedback and results of a ROS action.
@@ -87,12 +87,26 @@ async fn follow<A: Meaning>(
     pursue_on(&pursued, performance, |message| A::progress(call, message), A::shortfall).await
 }
 
+/// Waits until a server is `ready` or the action is cancelled. Nothing is sent meanwhile.
+async fn await_server<E: ToString>(
+    ready: impl Future<Output = Result<(), E>>,
+    performance: &Performance,
+) -> Result<(), End> {
+    let canceled = async {
+        performance.canceled().await;
+        Err(End::Canceled)
+    };
+    let ready = async { ready.await.map_err(|error| End::Failed(error.to_string())) };
+    smol::future::or(canceled, ready).await
+}
+
 /// Sends a goal, and waits until the server accepts it. If the action is cancelled meanwhile, the goal is cancelled.
 pub(super) async fn send<A: Action + 'static>(
     caller: &ActionCaller<A>,
     goal: A::Goal,
     performance: &Performance,
 ) -> Result<Pursued<A>, End> {
+    await_server(caller.ready(SERVER_TIMEOUT), performance).await?;
     let mut pursuit = Box::pin(caller.pursue(goal, SERVER_TIMEOUT));
     let canceled = async {
         performance.canceled().await;
@@ -118,14 +132,8 @@ pub(super) async fn call<S: Service>(
     request: S::Request,
     performance: &Performance,
 ) -> Result<S::Response, End> {
-    let canceled = async {
-        performance.canceled().await;
-        Err(End::Canceled)
-    };
-    let failed = |error: CallError| End::Failed(error.to_string());
-    let ready = async { caller.ready(SERVER_TIMEOUT).await.map_err(failed) };
-    smol::future::or(ready, canceled).await?;
-    caller.call(request, SERVER_TIMEOUT).await.map_err(failed)
+    await_server(caller.ready(SERVER_TIMEOUT), performance).await?;
+    caller.call(request, SERVER_TIMEOUT).await.map_err(|error| End::Failed(error.to_string()))
 }
 
 /// Forwards the progress of an accepted goal until the goal ends, and cancels the goal on request.

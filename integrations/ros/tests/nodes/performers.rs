@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use metaplan_ros::interfaces::action_msgs::srv::CancelGoal;
 use metaplan_ros::interfaces::plansys2_1::plansys2_msgs::action as older;
 use metaplan_ros::interfaces::plansys2_msgs::action::{
     ExecutePlan, ExecutePlanFeedback, ExecutePlanGoal, ExecutePlanResult,
@@ -170,6 +171,38 @@ fn an_action_without_a_server_is_cancelled_soon() {
         running.cancel();
         assert_eq!(hear(&running).1, End::Canceled, "{text}");
     }
+}
+
+#[test]
+fn a_goal_is_cancelled_without_an_answer_and_not_sent_after_a_cancellation() {
+    use nav2_msgs::action::NavigateToPose;
+
+    let domain = domain();
+    let (robot, observer) = (node(domain, "robot", ""), node(domain, "observer", ""));
+    let (sender, goals) = smol::channel::unbounded();
+    robot
+        .serve_action::<NavigateToPose>("/navigate_to_pose", move |event| {
+            sender.try_send(event).expect("the test receives");
+        })
+        .expect("an action");
+    // An action server does not report cancel requests for goals that it has not accepted.
+    let (sender, cancels) = smol::channel::unbounded();
+    observer
+        .serve::<CancelGoal>("/navigate_to_pose/_action/cancel_goal", move |request, _| {
+            sender.try_send(request).expect("the test receives");
+        })
+        .expect("a service");
+    let (manager, cast) = cast(domain, SETTINGS);
+    until("the server", || manager.is_written("/navigate_to_pose/_action/status"));
+    let running = cast.start(call("(move r1 kitchen hall)"));
+    running.cancel();
+    assert_eq!(hear(&running).1, End::Canceled);
+    let running = cast.start(call("(move r1 kitchen hall)"));
+    until("a goal", || !goals.is_empty());
+    running.cancel();
+    assert_eq!(hear(&running).1, End::Canceled);
+    until("a request to cancel the goal", || !cancels.is_empty());
+    assert_eq!(goals.len(), 1, "the first goal is not sent");
 }
 
 #[test]

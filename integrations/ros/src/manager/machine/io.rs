@@ -33,7 +33,7 @@ pub(in crate::manager) enum Input {
     /// A function without a reply was probed: `true` if it replies.
     Probed(String, bool),
     Autopilot(String),
-    /// The time to wait for the end of the action with this number is over.
+    /// The time of the wait with this number is over (see [`Output::Await`]).
     Overdue(u64),
     Tick,
 }
@@ -79,7 +79,7 @@ pub(in crate::manager) enum Output {
     Reply(u64, bool),
     Perform(u64, Call),
     Stop(u64),
-    /// Report after a delay that the action with this number should have ended.
+    /// Wait for the end of an action: after the delay, report the number of the wait as overdue.
     Await(u64, Duration),
     Plan(Value),
     Event(Value),

@@ -74,7 +74,9 @@ pub(super) struct Machine {
     modes: BTreeMap<String, String>,
     grants: BTreeMap<String, Grant>,
     action: Option<Action>,
-    /// Number of the action for whose end the end of its task waits.
+    /// Number of waits for the end of an action whose task has ended.
+    waits: u64,
+    /// Number of the present wait.
     ending: Option<u64>,
     start_requests: Vec<u64>,
     end_requests: Vec<u64>,
@@ -108,6 +110,7 @@ impl Machine {
             modes: BTreeMap::new(),
             grants: BTreeMap::new(),
             action: None,
+            waits: 0,
             ending: None,
             start_requests: Vec::new(),
             end_requests: Vec::new(),
@@ -174,7 +177,7 @@ impl Machine {
             Input::Progress(number, fraction) => self.progress(number, fraction),
             Input::Probed(function, answers) => self.probed(&function, answers),
             Input::Autopilot(mode) => self.autopilot(&mode),
-            Input::Overdue(number) => self.abandon(number),
+            Input::Overdue(wait) => self.abandon(wait),
             Input::Tick | Input::Diagnosed => self.tick(),
         };
         self.settle()?;

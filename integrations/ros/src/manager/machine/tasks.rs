@@ -89,10 +89,11 @@ impl Machine {
             // The robot needs the functions until the performer reports the end.
             Some(action) => {
                 action.is_stopped = true;
-                let number = action.number;
-                self.outputs.push(Output::Stop(number));
-                if self.ending.replace(number).is_none() {
-                    self.outputs.push(Output::Await(number, STOP_WAIT));
+                self.outputs.push(Output::Stop(action.number));
+                if self.ending.is_none() {
+                    self.waits += 1;
+                    self.ending = Some(self.waits);
+                    self.outputs.push(Output::Await(self.waits, STOP_WAIT));
                 }
             }
             None => self.end_action(),
@@ -117,9 +118,9 @@ impl Machine {
     }
 
     /// Ends an action whose performer has not reported its end in time after the end of the task.
-    pub(super) fn abandon(&mut self, number: u64) -> String {
-        if self.ending != Some(number) {
-            return format!("action {number} is not awaited");
+    pub(super) fn abandon(&mut self, wait: u64) -> String {
+        if self.ending != Some(wait) {
+            return "the action has ended in time".to_owned();
         }
         for request in std::mem::take(&mut self.end_requests) {
             self.outputs.push(Output::Reply(request, false));

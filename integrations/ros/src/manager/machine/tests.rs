@@ -180,7 +180,7 @@ fn functions_keep_their_designs_until_the_action_of_a_cancelled_task_has_ended()
     let mut robot = stopping(None);
     robot.now += Duration::from_secs(9);
     assert_eq!(robot.handle(Input::Tick), []);
-    assert_eq!(robot.handle(Input::Overdue(0)), [], "an earlier action");
+    assert_eq!(robot.handle(Input::Overdue(0)), [], "an earlier wait");
     assert_eq!(robot.cancel("search_pipeline"), [Output::Stop(1)], "the time begins with the first request");
     let outputs = robot.handle(Input::Overdue(1));
     assert_eq!(outputs[..2], [Output::Reply(8, false), Output::Reply(8, false)]);
@@ -199,6 +199,19 @@ fn a_new_task_waits_for_the_end_of_the_cancelled_action() {
     assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
     let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
     assert_eq!(performed(&robot.obey(outputs)), ["inspect_pipeline"]);
+}
+
+#[test]
+fn a_cancelled_task_does_not_inherit_the_time_of_the_previous_one() {
+    let mut robot = stopping(None);
+    let outputs = robot.request("inspect_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.cancel("inspect_pipeline");
+    assert!(outputs.contains(&Output::Await(2, Duration::from_secs(3))), "{outputs:?}");
+    assert_eq!(robot.handle(Input::Overdue(1)), [], "the wait of the previous task");
+    let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
+    let outputs = robot.obey(outputs);
+    assert!(outputs.contains(&Output::Reply(8, true)), "{outputs:?}");
 }
 
 #[test]

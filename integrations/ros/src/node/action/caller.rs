@@ -99,6 +99,8 @@ struct Unanswered<A: Action> {
     since: Instant,
     /// Closed if the sender of the goal no longer waits.
     answer: channel::Sender<Result<Pursued<A>, GoalError>>,
+    /// `true` after a request to cancel the goal, because its sender no longer waits.
+    is_cancelled: bool,
 }
 
 struct Followed<A: Action> {
@@ -178,8 +180,17 @@ impl<A: Action> std::fmt::Debug for ActionCaller<A> {
 }
 
 impl<A: Action + 'static> ActionCaller<A> {
+    /// Waits up to `within` for a server and connects to it. Sends nothing.
+    ///
+    /// # Errors
+    /// Fails if the action has no server in time, the server has another type, or the client cannot be created.
+    pub async fn ready(&self, within: Duration) -> Result<(), GoalError> {
+        self.connect(within).await.map(|_| ()).map_err(|because| unreachable(&self.full, because))
+    }
+
     /// Sends a goal, and waits until the server accepts it. `within` limits the time to wait for a
-    /// server and its answer. A goal without an answer in time is cancelled, even if it is accepted later.
+    /// server and its answer. A goal without an answer in time is cancelled, and again if it is accepted later. The
+    /// same applies to a goal that was sent before the returned future is dropped.
     ///
     /// # Errors
     /// Fails if no server of the expected type accepts the goal in time.
@@ -188,8 +199,7 @@ impl<A: Action + 'static> ActionCaller<A> {
         let unreachable = |because: String| unreachable(&self.full, because);
         let connection = self.connect(within).await.map_err(unreachable)?;
         let (sender, answer) = channel::bounded(1);
-        let (goal, is_first) =
-            connection.send(goal, sender).map_err(|error| unreachable(error.to_string()))?;
+        let is_first = connection.send(goal, sender).map_err(|error| unreachable(error.to_string()))?;
         if is_first {
             let (graph, full, running) =
                 (Arc::clone(&self.node.graph), self.full.clone(), Arc::clone(&connection));
@@ -203,13 +213,6 @@ impl<A: Action + 'static> ActionCaller<A> {
         if let Some(answer) = smol::future::or(async { answer.recv().await.ok() }, timeout).await {
             return answer;
         }
-        // The server may have accepted the goal, and the robot would then move on its own. Answers that are received from
-        // here on are late.
-        drop(answer);
-        // Under the lock, because the client library may give concurrent requests the same number.
-        let goals = connection.goals();
-        let _ = connection.client.cancel_goal(goal);
-        drop(goals);
         let mapping = connection.server.mapping;
         Err(unreachable(format!(
             "no answer to a goal after {:.1} s; it was sent with the service mapping of {mapping}; `--rmw {}` selects \
@@ -256,19 +259,19 @@ impl<A: Action + 'static> Connection<A> {
         self.goals.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Sends a goal. Returns its id, and `true` if it is the only one, so that a task must be
-    /// started to receive messages.
+    /// Sends a goal. Returns `true` if it is the only one, so that a task must be started to receive messages.
     fn send(
         &self,
         goal: A::Goal,
         answer: channel::Sender<Result<Pursued<A>, GoalError>>,
-    ) -> WriteResult<(GoalId, bool), ()> {
+    ) -> WriteResult<bool, ()> {
         // The lock is held so that the answer cannot be received before the goal is registered.
         let mut goals = self.goals();
         let is_first = goals.is_empty();
         let (request, goal) = self.client.send_goal(goal)?;
-        goals.unanswered.push(Unanswered { request, goal, since: Instant::now(), answer });
-        Ok((goal, is_first))
+        let since = Instant::now();
+        goals.unanswered.push(Unanswered { request, goal, since, answer, is_cancelled: false });
+        Ok(is_first)
     }
 
     /// Forwards the messages about all goals until all goals have ended. A goal whose result can no longer arrive ends with
@@ -322,11 +325,16 @@ impl<A: Action + 'static> Connection<A> {
         }
     }
 
-    /// Ends the goals whose results can no longer arrive, with the servers that are present.
+    /// Cancels the unanswered goals whose senders no longer wait. Ends the goals whose results can no longer arrive,
+    /// with the servers that are present.
     fn end_lost(&self, servers: &BTreeSet<[u8; 16]>, full: &str) {
         let (mut goals, now) = (self.goals(), Instant::now());
         let ClientGoals { unanswered, accepted, malformed } = &mut *goals;
         unanswered.retain(|unanswered| unanswered.since.elapsed() < LATE_ANSWER_WAIT);
+        for unanswered in unanswered.iter_mut().filter(|goal| goal.answer.is_closed() && !goal.is_cancelled) {
+            // The server may have accepted the goal, and the robot would then move on its own.
+            unanswered.is_cancelled = self.client.cancel_goal(unanswered.goal).is_ok();
+        }
         accepted.retain(|goal, followed| {
             let because = match followed.prospect.loss(servers, malformed.is_some(), now) {
                 None => return true,
