@@ -174,7 +174,7 @@ fn an_action_without_a_server_is_cancelled_soon() {
 }
 
 #[test]
-fn a_goal_is_cancelled_without_an_answer_and_not_sent_after_a_cancellation() {
+fn a_goal_is_cancelled_without_an_answer() {
     use nav2_msgs::action::NavigateToPose;
 
     let domain = domain();
@@ -192,17 +192,12 @@ fn a_goal_is_cancelled_without_an_answer_and_not_sent_after_a_cancellation() {
             sender.try_send(request).expect("the test receives");
         })
         .expect("a service");
-    let (manager, cast) = cast(domain, SETTINGS);
-    until("the server", || manager.is_written("/navigate_to_pose/_action/status"));
-    let running = cast.start(call("(move r1 kitchen hall)"));
-    running.cancel();
-    assert_eq!(hear(&running).1, End::Canceled);
+    let (_manager, cast) = cast(domain, SETTINGS);
     let running = cast.start(call("(move r1 kitchen hall)"));
     until("a goal", || !goals.is_empty());
     running.cancel();
     assert_eq!(hear(&running).1, End::Canceled);
     until("a request to cancel the goal", || !cancels.is_empty());
-    assert_eq!(goals.len(), 1, "the first goal is not sent");
 }
 
 #[test]
