@@ -83,7 +83,7 @@ fn timed(directory: &Path, name: &str, arguments: &[&str], certificate: &str) ->
 }
 
 /// Prints the results and asserts that the costs are right. In release builds, verification must take at most
-/// ten times as long as planning.
+/// ten times as long as planning, or at most half a second.
 #[allow(clippy::print_stdout)]
 fn report(rows: &[Row]) {
     let mut text = String::new();
@@ -105,7 +105,7 @@ fn report(rows: &[Row]) {
     println!("{text}");
     let unexpected: Vec<_> = rows.iter().filter(|row| row.result != row.expected).collect();
     assert!(unexpected.is_empty(), "{unexpected:#?}");
-    let slow: Vec<_> = rows.iter().filter(|row| row.verifying > 10.0 * row.planning).collect();
+    let slow: Vec<_> = rows.iter().filter(|row| row.verifying > (10.0 * row.planning).max(0.5)).collect();
     assert!(cfg!(debug_assertions) || slow.is_empty(), "{slow:#?}");
 }
 
