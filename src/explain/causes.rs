@@ -147,7 +147,7 @@ fn nearest(sets: &[Vec<Alteration>]) -> Vec<Vec<Alteration>> {
 }
 
 pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
-    let available = mission.is_available(&mission.current(), &design.individual.name);
+    let available = mission.is_available(&mission.current(), design);
     let mut availability = Availability {
         design: design.individual.name.clone(),
         functions: design.solves.iter().map(|function| function.name.clone()).collect(),
@@ -178,13 +178,13 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         let ways: Vec<_> = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
         availability.ways = nearest(&ways);
         availability.unexamined = bounds.unexamined;
-        availability.confirm(mission);
+        availability.confirm(mission, design);
         return availability;
     }
     let Ways { sets, unexamined } = ways(knowledge, design);
     availability.ways = sets;
     availability.unexamined = unexamined;
-    availability.confirm(mission);
+    availability.confirm(mission, design);
     availability.causes = causes_of(knowledge, design, &availability.ways);
     let derived = ruled_out(knowledge, &design.individual.name);
     for line in availability.causes.iter().flat_map(|cause| &cause.because).chain(&derived) {
@@ -198,7 +198,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
 impl Availability {
     /// In PLANTA's form, omits the sets of alterations after which the axioms of the domain do not change the
     /// availability of the design, for example because of facts of the problem.
-    fn confirm(&mut self, mission: &Mission) {
+    fn confirm(&mut self, mission: &Mission, design: &FunctionDesign) {
         if mission.completed_predicates().is_none() {
             return;
         }
@@ -206,7 +206,7 @@ impl Availability {
             let mut mission = mission.clone();
             let knowledge = mission.knowledge_mut()?;
             *knowledge = altered(knowledge, way)?;
-            Some(mission.is_available(&mission.current(), &self.design) != self.available)
+            Some(mission.is_available(&mission.current(), design) != self.available)
         };
         let (sufficient, insufficient): (Vec<_>, Vec<_>) =
             self.ways.iter().cloned().partition(|way| changes(way) == Some(true));

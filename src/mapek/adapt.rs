@@ -227,7 +227,7 @@ impl Adaptation<'_> {
         let mut outcome = self.plan(true);
         // The absence of a plan for an outdated situation is no reason for a decision, unless the situation changes
         // faster than searches end.
-        let is_ignored = self.planner.is_outdated && !self.planner.accepts_absence;
+        let is_ignored = self.planner.prepared.is_outdated && !self.planner.prepared.accepts_absence();
         self.planner.is_missing |= is_ignored && outcome.steps.is_none();
         if self.planner.is_missing {
             return;
@@ -324,7 +324,7 @@ impl Adaptation<'_> {
     /// otherwise, the action is treated as cancelled. The outcome has no plan if conclusions are missing, or if the
     /// plan found uses an unavailable design.
     pub(super) fn plan(&mut self, goes_on: bool) -> Outcome {
-        self.planner.is_outdated = false;
+        self.planner.prepared.is_outdated = false;
         if let Some(fault) = &self.beliefs.fault {
             return Outcome::no_plan(false, missing_conclusions(fault));
         }

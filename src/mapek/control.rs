@@ -100,8 +100,6 @@ pub struct Loop {
     agenda: Option<Agenda>,
     /// Number of reactions that may have changed the planning problem, which identifies the current problem.
     pub(super) question: u64,
-    /// Number of consecutive results of searches for earlier planning problems that could not be used.
-    pub(super) late_results: u32,
     pub(super) digest: String,
     /// Number of names and values that the knowledge base had in addition to those of its documents when it was last
     /// rebuilt; 0 before.
@@ -138,17 +136,7 @@ impl Loop {
             beliefs.available = available(base);
         }
         let agenda = Some(Agenda { is_start: true, ..Agenda::default() });
-        Ok(Self {
-            settings,
-            beliefs,
-            monitor,
-            planner,
-            agenda,
-            question: 0,
-            late_results: 0,
-            digest,
-            rebuilt_growth: 0,
-        })
+        Ok(Self { settings, beliefs, monitor, planner, agenda, question: 0, digest, rebuilt_growth: 0 })
     }
 
     /// Returns the settings of the loop.

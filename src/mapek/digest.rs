@@ -7,9 +7,6 @@ use crate::mapek::event::FORMAT;
 use crate::mapek::settings::{Settings, Unrecorded};
 use crate::mission::Mission;
 
-/// Number of equal names of an individual up to which all pairs of names are part of a checksum.
-const MANY_NAMES: usize = 32;
-
 /// Returns the checksum of the inputs and of the versions of program and format, on which initial decisions also depend.
 pub(super) fn versioned(inputs: &str) -> String {
     checksum(&[env!("CARGO_PKG_VERSION").to_owned(), FORMAT.to_owned(), inputs.to_owned()])
@@ -35,10 +32,8 @@ pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
 
 pub(crate) fn knowledge_parts(knowledge: &Knowledge) -> [String; 2] {
     let engine = knowledge.engine();
-    let mut facts = engine.facts_in_brief(MANY_NAMES);
-    facts.sort_unstable();
     [
-        ontology::ntriples(engine.symbols(), &facts),
+        ontology::ntriples(engine.symbols(), &knowledge.facts()),
         rules::print_rules(engine.program(), engine.symbols(), &rules::Prefixes::default()),
     ]
 }

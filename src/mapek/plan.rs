@@ -21,8 +21,12 @@ use crate::number;
 
 const MAX_DOUBLINGS: u32 = 3;
 
+/// Number of consecutive unusable results for changed problems after which the absence of a plan for a changed problem
+/// is a reason for a decision. Otherwise, observations that change the problem all the time would prevent every
+/// decision without a plan.
+const MAX_LATE: u32 = 3;
+
 #[derive(Debug, Clone, Default)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(crate) struct Planner {
     pub time_limit: Option<Duration>,
     /// Number of earlier searches in the current series of scheduled repetitions. Each doubles the time limit, up to
@@ -38,21 +42,34 @@ pub(crate) struct Planner {
     pub is_missing: bool,
     /// Planning problems of the current deliberation with their outcomes; `None` if they are not logged.
     pub question_log: Option<Vec<(StoredQuestion, Outcome)>>,
-    /// Planning problems with outcomes that another thread has computed, in order.
-    pub prepared: VecDeque<(StoredQuestion, Outcome)>,
-    /// Whether the number of the planning problem has changed since the prepared outcomes were computed.
-    pub is_late: bool,
-    /// Whether the last outcome is prepared and about another situation than the question, from which the situation
-    /// differs by more than progress of the action under way.
-    pub is_outdated: bool,
-    /// Whether the absence of a plan for another situation is a reason for a decision, because too many searches in a
-    /// row have ended with outcomes for other situations.
-    pub accepts_absence: bool,
-    /// Whether a prepared outcome with a plan was about another situation than the question.
-    pub has_outdated_plan: bool,
+    pub prepared: Prepared,
     pub live: Live,
     pub memo: Memo,
     pub watch: Watch,
+}
+
+/// Outcomes that another thread has computed, and how the situation has changed since.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Prepared {
+    /// Planning problems with their outcomes, in order.
+    pub outcomes: VecDeque<(StoredQuestion, Outcome)>,
+    /// Whether the number of the planning problem has changed since the outcomes were computed.
+    pub is_late: bool,
+    /// Whether the last outcome is about another situation than the question, from which the situation differs by more
+    /// than progress of the action under way.
+    pub is_outdated: bool,
+    /// Whether an outcome with a plan was about another situation than the question.
+    pub has_outdated_plan: bool,
+    /// Number of consecutive earlier results for other planning problems that could not be used.
+    pub late_results: u32,
+}
+
+impl Prepared {
+    /// Returns `true` if the absence of a plan for another situation is a reason for a decision, because too many searches
+    /// in a row have ended with outcomes for other situations.
+    pub fn accepts_absence(&self) -> bool {
+        self.is_late && self.late_results >= MAX_LATE
+    }
 }
 
 impl Planner {
@@ -60,7 +77,7 @@ impl Planner {
     /// a plan. If searches are forbidden, sets `is_missing` and returns an outcome without a plan.
     pub fn plan(&mut self, question: &Question<'_>) -> Outcome {
         // Recorded and prepared outcomes have an order. Therefore, they are consumed even if the memo has the answer.
-        let recorded = self.recorded.pop_front().or_else(|| self.prepared(question));
+        let recorded = self.recorded.pop_front().or_else(|| self.next_prepared(question));
         let stored_outcome = recorded.or_else(|| self.memo.recall(question));
         if stored_outcome.is_none() && self.forbids_search {
             self.is_missing = true;
@@ -78,19 +95,20 @@ impl Planner {
     /// the outcome is about a different action under way. If the situation has changed, for example by progress of the
     /// action, the outcome no longer counts as proved. Progress alone is no reason to doubt that no plan continues the
     /// action, so the outcome states whether this was proved.
-    fn prepared(&mut self, question: &Question<'_>) -> Option<Outcome> {
-        let (answered, mut outcome) = self.prepared.pop_front()?;
+    fn next_prepared(&mut self, question: &Question<'_>) -> Option<Outcome> {
+        let (answered, mut outcome) = self.prepared.outcomes.pop_front()?;
         if !answered.has_same_action(question) {
             return None;
         }
         if answered.equals(question) {
             self.memo.store(question, &outcome);
         } else {
-            self.is_outdated = self.is_late || !answered.has_equal_start(question);
-            self.has_outdated_plan |= outcome.steps.is_some();
+            let prepared = &mut self.prepared;
+            prepared.is_outdated = prepared.is_late || !answered.has_equal_start(question);
+            prepared.has_outdated_plan |= outcome.steps.is_some();
             let was_proved = std::mem::take(&mut outcome.proved);
             if outcome.steps.is_none() {
-                outcome.was_proved = was_proved && (!self.is_outdated || self.accepts_absence);
+                outcome.was_proved = was_proved && (!prepared.is_outdated || prepared.accepts_absence());
                 "no plan was found for an earlier situation".clone_into(&mut outcome.because);
                 outcome.blocking.clear();
             }

@@ -17,6 +17,7 @@ use crate::mapek::ask::Outcome;
 use crate::mapek::control::Loop;
 use crate::mapek::event::{Event, Observation};
 use crate::mapek::memo::StoredQuestion;
+use crate::mapek::plan::Prepared;
 
 /// A copy of an adaptation loop that computes plans on another thread.
 #[derive(Debug)]
@@ -79,11 +80,6 @@ pub struct ParallelSearch {
 /// Number of consecutive cancelled searches after which a changed problem does not cancel the next one. A
 /// search without a current problem is always cancelled.
 const MAX_CANCELLED: u32 = 3;
-
-/// Number of consecutive unusable results for changed problems after which the absence of a plan for a changed problem
-/// is a reason for a decision. Otherwise, observations that change the problem all the time would prevent every
-/// decision without a plan.
-const MAX_LATE: u32 = 3;
 
 impl ParallelSearch {
     /// Registers a search that begins. An earlier search that is still registered is interrupted.
@@ -188,44 +184,40 @@ impl Loop {
             self.roll_back(before);
             return None;
         }
-        self.late_results = 0;
+        self.planner.prepared.late_results = 0;
         Some(answers)
     }
 
     /// Runs [`Loop::deliberate`] with the plans in `thoughts`. Returns `None` and leaves the loop unchanged, except
     /// for the number of late results, if planning was interrupted, if the loop that planned has another mission, or if
-    /// a plan is missing or does not fit the situation. Unless `is_late` is `true`, this is also the case if the
+    /// a plan is missing or does not fit the situation. Unless `accepts_late` is `true`, this is also the case if the
     /// planning problem has changed since.
-    pub fn deliberate_with(&mut self, thoughts: Thoughts, is_late: bool) -> Option<Vec<Answer>> {
-        if !self.is_usable(&thoughts) || !self.is_answered_by(&thoughts) && !is_late {
+    pub fn deliberate_with(&mut self, thoughts: Thoughts, accepts_late: bool) -> Option<Vec<Answer>> {
+        if !self.is_usable(&thoughts) || !self.is_answered_by(&thoughts) && !accepts_late {
             return None;
         }
         // A checkpoint covers only changes before the first plan. Therefore, the whole loop is copied.
         let before = self.clone();
-        self.planner.is_late = !self.is_answered_by(&thoughts);
-        self.planner.accepts_absence = self.planner.is_late && self.late_results >= MAX_LATE;
-        self.planner.prepared = thoughts.answers.into();
+        let late_results = self.planner.prepared.late_results;
+        let is_late = !self.is_answered_by(&thoughts);
+        let outcomes = thoughts.answers.into();
+        self.planner.prepared = Prepared { outcomes, is_late, late_results, ..Prepared::default() };
         self.planner.forbids_search = true;
         let answers = self.deliberate();
         // A plan for an earlier situation may not fit the current one. A plan that was kept although it does not fit is
         // no reason to search again.
         let misfits = || {
-            self.planner.has_outdated_plan
+            self.planner.prepared.has_outdated_plan
                 && self.beliefs.plan.is_some()
                 && self.beliefs.violation().is_some()
         };
         if self.planner.is_missing || misfits() {
-            let late_results = self.late_results + u32::from(self.planner.is_late);
             *self = before;
-            self.late_results = late_results;
+            self.planner.prepared.late_results += u32::from(is_late);
             return None;
         }
-        self.late_results = 0;
-        self.planner.accepts_absence = false;
         self.planner.forbids_search = false;
-        self.planner.is_outdated = false;
-        self.planner.has_outdated_plan = false;
-        self.planner.prepared.clear();
+        self.planner.prepared = Prepared::default();
         Some(answers)
     }
 }
@@ -268,7 +260,7 @@ mod tests {
         let Setup { mission, settings, .. } = Setup::read(&manifest).expect("the mission is read");
         let mut control = Loop::new(mission, settings).expect("a loop");
         control.start();
-        control.planner.is_outdated = true;
+        control.planner.prepared.is_outdated = true;
         let goal = r#"{"event":"goal_changed","goal":"(robot_at wp2)"}"#;
         control.react(&Observation::parse(goal), Duration::from_secs(1));
         control.beliefs.fault = Some(Fault {

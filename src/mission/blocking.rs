@@ -59,17 +59,16 @@ pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option
     if designs.is_empty() {
         return None;
     }
-    let names: Vec<String> = designs.into_iter().map(|design| design.individual.name).collect();
     let mut missing = Vec::new();
-    for name in &names {
+    for design in &designs {
         config.limits.check().ok()?;
-        if !mission.is_available(problem, name) {
-            missing.push(name.clone());
+        if !mission.is_available(problem, design) {
+            missing.push(design.individual.name.clone());
         }
     }
     let mut is_solvable = solvable_with(mission, problem, &missing, config)?;
-    if !is_solvable && mission.completed_predicates().is_some() && missing.len() < names.len() {
-        missing = names;
+    if !is_solvable && mission.completed_predicates().is_some() && missing.len() < designs.len() {
+        missing = designs.into_iter().map(|design| design.individual.name).collect();
         is_solvable = solvable_with(mission, problem, &missing, config)?;
     }
     let mut blocking = missing.clone();

@@ -8,7 +8,7 @@ use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
 use ontology::vocab::local_name;
 use pddl::ast::{Atom, Condition, Declaration, Domain, InitialElement, Name, Problem, Term};
-use pddl::{self, Mentioned, Severity, Source};
+use pddl::{self, Severity, Source};
 use rules::Fact;
 
 use crate::binding;
@@ -88,14 +88,11 @@ impl Mission {
     }
 
     /// Returns `true` if a fact of the knowledge base can be part of the filled problem by its predicate: a class that is
-    /// bound to a type, or in PLANTA's form a predicate that the domain file or the goal
-    /// uses.
+    /// bound to a type, or in PLANTA's form a predicate that the domain file or the goal uses.
     pub fn contains_fact(&self, fact: &Fact) -> bool {
         let Some(engine) = self.knowledge.as_ref().map(Knowledge::engine) else { return false };
         if let Some(planta) = &self.planta {
-            let mut in_goal = Mentioned::default();
-            in_goal.condition(&self.problem.goal);
-            return planta.uses(fact, engine, &in_goal.predicates);
+            return planta.uses(fact, engine, &self.problem.goal);
         }
         let iri = engine.symbols().value(fact.predicate).as_name().unwrap_or_default();
         let is_class = |class: String| class == *iri || class == local_name(iri);
@@ -169,15 +166,14 @@ impl Mission {
         self.decides_on(design) && predicates.any(|predicate| self.holds(&format!("{predicate} {design}")))
     }
 
-    /// Returns `true` if a design of the knowledge base, given by its name, is available in the initial state of a
-    /// filled problem. In PLANTA's form, the axioms of the domain decide, which also read the facts of the problem.
-    /// Otherwise, the conclusions of the knowledge base decide.
-    pub fn is_available(&self, problem: &Problem, design: &str) -> bool {
-        if let Some(planta) = &self.planta {
-            return planta.is_available(&self.domain, problem, design);
-        }
-        let mut designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
-        designs.any(|candidate| candidate.individual.name == design && candidate.available)
+    /// Returns `true` if a design of the knowledge base is available in the initial state of a filled problem. In PLANTA's
+    /// form, the axioms of the domain decide, which also read the facts of the problem. Otherwise, the conclusions of the
+    /// knowledge base decide.
+    pub fn is_available(&self, problem: &Problem, design: &FunctionDesign) -> bool {
+        let name = &design.individual.name;
+        self.planta
+            .as_ref()
+            .map_or(design.available, |planta| planta.is_available(&self.domain, problem, name))
     }
 
     /// Changes which designs of a filled problem are available and returns the domain for that problem. All predicates

@@ -380,6 +380,12 @@ impl Comparison {
         }
     }
 
+    /// Returns `true` if the right side is a lower bound of the left one.
+    #[must_use]
+    pub fn is_lower_bound(self) -> bool {
+        matches!(self, Self::Equal | Self::GreaterOrEqual | Self::Greater)
+    }
+
     /// Returns the relation after an exchange of the two sides: `a < b` becomes `b > a`.
     pub(crate) fn mirrored(self) -> Self {
         match self {

@@ -6,9 +6,7 @@ use std::collections::BTreeMap;
 use num_rational::BigRational;
 use num_traits::{Signed as _, Zero as _};
 
-use crate::ast::{
-    ActionBody, Arithmetic, Comparison, Domain, Effect, Expression, InitialElement, Name, Problem,
-};
+use crate::ast::{ActionBody, Arithmetic, Domain, Effect, Expression, InitialElement, Name, Problem};
 use crate::visit::Node;
 
 /// Lower bound on the sign of a value.
@@ -60,14 +58,8 @@ impl Signs {
 
     /// Returns `false` if the action is instantaneous, or if its duration is certainly above 0. The test is conservative.
     pub fn admit_zero(&self, body: &ActionBody) -> bool {
-        let ActionBody::Durative { duration, .. } = body else { return false };
-        !duration.iter().any(|constraint| {
-            let is_lower_bound = matches!(
-                constraint.operator,
-                Comparison::Equal | Comparison::GreaterOrEqual | Comparison::Greater
-            );
-            is_lower_bound && self.sign(&constraint.expression) == Sign::Positive
-        })
+        let is_positive = |expression: &Expression| self.sign(expression) == Sign::Positive;
+        matches!(body, ActionBody::Durative { .. }) && !body.has_positive_duration(is_positive)
     }
 
     fn sign(&self, expression: &Expression) -> Sign {

@@ -104,6 +104,14 @@ impl ActionBody {
         }
     }
 
+    /// Returns `true` if a lower bound of the duration is above 0. `is_positive` decides this for an expression. Returns
+    /// `false` for instantaneous actions.
+    pub fn has_positive_duration(&self, is_positive: impl Fn(&Expression) -> bool) -> bool {
+        let mut durations = self.durations().iter();
+        durations
+            .any(|constraint| constraint.operator.is_lower_bound() && is_positive(&constraint.expression))
+    }
+
     /// Visits the constraints on the duration, the conditions and the effects, in this order.
     pub fn walk<'t>(&'t self, visit: Visit<'_, 't>) {
         for constraint in self.durations() {
@@ -147,6 +155,15 @@ impl Trajectory {
 }
 
 impl Condition {
+    /// Returns `true` if the condition has an atom with a predicate for which `is_wanted` returns `true`.
+    pub fn has_atom(&self, is_wanted: impl Fn(&Name) -> bool) -> bool {
+        let mut has_atom = false;
+        self.walk(&mut |node| {
+            has_atom |= node.atom().is_some_and(|atom| is_wanted(&atom.predicate.name));
+        });
+        has_atom
+    }
+
     /// Direct subconditions, from left to right.
     pub fn parts(&self) -> impl Iterator<Item = &Self> {
         let (first, second): (&[Self], &[Self]) = match self {

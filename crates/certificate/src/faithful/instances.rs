@@ -6,9 +6,7 @@ use rustc_hash::FxHashMap;
 use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use num_traits::Signed as _;
-use pddl::ast::{
-    Action, ActionBody, Arithmetic, Atom, Comparison, Condition, ConditionTime, Expression, Name, Term,
-};
+use pddl::ast::{Action, ActionBody, Arithmetic, Atom, Condition, ConditionTime, Expression, Name, Term};
 
 pub(super) const INSTANCE_LIMIT: usize = 400_000;
 /// Upper limit on the total number of arguments of all instances, which then take 256 MB.
@@ -27,14 +25,9 @@ pub(super) fn of(
     let mut atoms = Vec::new();
     match &action.body {
         ActionBody::Instantaneous { precondition, .. } => conjuncts(precondition, &mut atoms),
-        ActionBody::Durative { duration, conditions, .. } => {
+        ActionBody::Durative { conditions, .. } => {
             // Conditions over all do not apply to an instance with the duration 0.
-            let is_positive = duration.iter().any(|constraint| {
-                matches!(
-                    constraint.operator,
-                    Comparison::Equal | Comparison::GreaterOrEqual | Comparison::Greater
-                ) && is_positive(world, &constraint.expression)
-            });
+            let is_positive = action.body.has_positive_duration(|expression| is_positive(world, expression));
             for (time, condition) in conditions {
                 if is_positive || *time != ConditionTime::OverAll {
                     conjuncts(condition, &mut atoms);

@@ -499,6 +499,14 @@ impl Knowledge {
         Ok(warnings)
     }
 
+    /// Returns all facts that hold, in the order of symbols. If an individual has more than 32 equal names, only the pairs
+    /// with its first name are listed.
+    pub fn facts(&self) -> Vec<Fact> {
+        let mut facts = self.engine().facts_in_brief(MANY_NAMES);
+        facts.sort_unstable();
+        facts
+    }
+
     /// Returns the inferred facts in an order that depends only on the sources and on the later
     /// updates. If an individual has more than 32 equal names, only the pairs with its first name are
     /// listed.

@@ -30,9 +30,8 @@ use num_traits::{Signed as _, Zero as _};
 use ontology::tomasys::{FunctionDesign, Individual, Quality, View};
 use pddl::Signs;
 use pddl::ast::{
-    Action, ActionBody, Arithmetic, Assignment, Comparison, Condition, ConditionTime, Declaration, Domain,
-    DurationConstraint, Effect, EffectTime, Expression, Identifier, InitialElement, Name, Problem, Span,
-    Term, TypeExpression, TypedName,
+    Action, ActionBody, Arithmetic, Assignment, Condition, ConditionTime, Declaration, Domain, Effect,
+    EffectTime, Expression, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
 };
 
 use crate::binding::{Bindings, add_values, atom, has_value, identifier, is_pddl_name};
@@ -275,19 +274,11 @@ impl CoAdaptation {
 
     /// Returns `true` if an action with designs is durative and has no number above 0 as lower bound of its duration.
     pub(super) fn may_be_instantaneous(&self, domain: &Domain) -> bool {
-        let is_positive = |constraint: &DurationConstraint| {
-            let is_lower_bound = matches!(
-                constraint.operator,
-                Comparison::Equal | Comparison::GreaterOrEqual | Comparison::Greater
-            );
-            is_lower_bound
-                && matches!(&constraint.expression, Expression::Number(number, _) if number.is_positive())
-        };
+        let is_positive = |expression: &Expression| matches!(expression, Expression::Number(number, _) if number.is_positive());
         let mut actions =
             domain.actions.iter().filter(|action| self.actions.contains_key(&action.identifier.name));
-        actions.any(|action| match &action.body {
-            ActionBody::Durative { duration, .. } => !duration.iter().any(is_positive),
-            ActionBody::Instantaneous { .. } => false,
+        actions.any(|Action { body, .. }| {
+            matches!(body, ActionBody::Durative { .. }) && !body.has_positive_duration(is_positive)
         })
     }
 
@@ -306,7 +297,7 @@ impl CoAdaptation {
             let ActionBody::Durative { conditions, effects, .. } = &mut action.body else { continue };
             let lasting = conditions.iter().filter(|(time, condition)| {
                 *time == ConditionTime::OverAll
-                    && is_about(condition, &added)
+                    && condition.has_atom(|predicate| added.contains(predicate))
                     && !is_ended_context(condition, effects, domain)
             });
             let starts: Vec<_> = lasting.map(|(_, part)| (ConditionTime::AtStart, part.clone())).collect();
@@ -698,13 +689,4 @@ fn total(mut parts: Vec<Expression>, span: Span) -> Expression {
         1 => parts.remove(0),
         _ => Expression::Operation(Arithmetic::Add, parts, span),
     }
-}
-
-/// Returns `true` if a condition has an atom of one of the predicates.
-fn is_about(condition: &Condition, predicates: &BTreeSet<Name>) -> bool {
-    let mut is_about = false;
-    condition.walk(&mut |node| {
-        is_about |= node.atom().is_some_and(|atom| predicates.contains(&atom.predicate.name));
-    });
-    is_about
 }

@@ -93,13 +93,16 @@ impl Planta {
         (Self { terms: Arc::new(terms_of_mission), number, known: predicates, used }, completed, warnings)
     }
 
-    /// Returns `true` if the domain file or the goal, with the predicates `in_goal`, uses the predicate of a fact: as an
-    /// assertion, or as an assertion or inference.
-    pub(crate) fn uses(&self, fact: &Fact, engine: &Engine, in_goal: &BTreeSet<Name>) -> bool {
+    /// Returns `true` if the domain file or the goal uses the predicate of a fact: as an assertion, or as an assertion or
+    /// inference.
+    pub(crate) fn uses(&self, fact: &Fact, engine: &Engine, goal: &Condition) -> bool {
         let predicate =
             engine.symbols().value(fact.predicate).as_name().and_then(|iri| self.terms.symbols.get(iri));
-        let is_used = |name: &Name| self.used.contains(name) || in_goal.contains(name);
-        predicate.is_some_and(|name| is_used(name) || is_used(&names::inferred(name)))
+        predicate.is_some_and(|name| {
+            let spellings = [name.clone(), names::inferred(name)];
+            spellings.iter().any(|name| self.used.contains(name))
+                || goal.has_atom(|name| spellings.contains(name))
+        })
     }
 
     pub(crate) fn known(&self) -> &HashSet<Name> {

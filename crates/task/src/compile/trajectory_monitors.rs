@@ -458,8 +458,7 @@ fn positive(action: &Action) -> Option<Condition> {
 fn takes_time(domain: &Domain, problem: &Problem, action: &Action) -> bool {
     let ActionBody::Durative { duration, .. } = &action.body else { return true };
     let [DurationConstraint { operator, expression, .. }] = &duration[..] else { return false };
-    let is_lower = matches!(operator, Comparison::Equal | Comparison::Greater | Comparison::GreaterOrEqual);
-    is_lower
+    operator.is_lower_bound()
         && match expression {
             Expression::Number(number, _) => number.is_positive(),
             Expression::Fluent(function) => {

@@ -17,9 +17,12 @@ use metaplan_ros::interfaces::rcl_interfaces::srv::{
 use metaplan_ros::interfaces::rcl_interfaces::{msg as parameters, msg::ParameterType};
 use metaplan_ros::interfaces::std_msgs;
 use metaplan_ros::interfaces::suave_msgs::srv::{Task, TaskRequest, TaskResponse};
-use metaplan_ros::node::{Accepted, Declared, GoalEnd, GoalEvent, Lifecycle, Phase, depth, latched};
+use metaplan_ros::node::{
+    Accepted, Declared, GoalEnd, GoalEvent, Goals, Lifecycle, Node, Phase, depth, latched,
+};
 use ros2_client::ParameterValue;
 use smol::block_on;
+use smol::channel::Receiver;
 
 use crate::common::{domain, node, until};
 
@@ -86,16 +89,18 @@ fn services_answer_or_it_is_said_why_not() {
     until("the server is gone", || !caller.is_served());
 }
 
+/// Serves the action `/mros/objective`. Returns its goals, and a channel that receives its events.
+fn objectives(server: &Arc<Node>) -> (Arc<Goals<ControlQos>>, Receiver<GoalEvent<ControlQos>>) {
+    let (sender, events) = smol::channel::unbounded();
+    let take = move |event| sender.try_send(event).expect("the test receives");
+    (server.serve_action("/mros/objective", take).expect("an action"), events)
+}
+
 #[test]
 fn goals_are_pursued_cancelled_and_rejected() {
     let domain = domain();
     let (server, client) = (node(domain, "server", ""), node(domain, "client", ""));
-    let (sender, events) = smol::channel::unbounded();
-    let goals = server
-        .serve_action::<ControlQos>("/mros/objective", move |event| {
-            sender.try_send(event).expect("somebody listens");
-        })
-        .expect("an action");
+    let (goals, events) = objectives(&server);
     let caller = client.action_caller::<ControlQos>("/mros/objective");
     let goal = |name: &str| {
         let mut goal = ControlQosGoal::default();
@@ -146,7 +151,7 @@ fn goals_are_pursued_cancelled_and_rejected() {
 }
 
 /// Returns the next message of a channel, or `None` after [`LONG`].
-fn next<T>(messages: &smol::channel::Receiver<T>) -> Option<T> {
+fn next<T>(messages: &Receiver<T>) -> Option<T> {
     block_on(smol::future::or(async { messages.recv().await.ok() }, async {
         smol::Timer::after(LONG).await;
         None
@@ -157,12 +162,7 @@ fn next<T>(messages: &smol::channel::Receiver<T>) -> Option<T> {
 fn a_goal_that_is_accepted_late_is_cancelled() {
     let domain = domain();
     let (server, client) = (node(domain, "server", ""), node(domain, "client", ""));
-    let (sender, events) = smol::channel::unbounded();
-    let goals = server
-        .serve_action::<ControlQos>("/mros/objective", move |event| {
-            sender.try_send(event).expect("the test receives");
-        })
-        .expect("an action");
+    let (goals, events) = objectives(&server);
     let caller = client.action_caller::<ControlQos>("/mros/objective");
     // The server is discovered, and does not answer the second goal in time.
     let pursuing = std::thread::spawn(move || {
@@ -191,12 +191,7 @@ fn a_goal_that_is_accepted_late_is_cancelled() {
 fn a_goal_is_lost_if_its_server_is_replaced() {
     let domain = domain();
     let (server, client) = (node(domain, "server", ""), node(domain, "client", ""));
-    let (sender, events) = smol::channel::unbounded();
-    let goals = server
-        .serve_action::<ControlQos>("/mros/objective", move |event| {
-            sender.try_send(event).expect("the test receives");
-        })
-        .expect("an action");
+    let (goals, events) = objectives(&server);
     let caller = client.action_caller::<ControlQos>("/mros/objective");
     let pursuing = std::thread::spawn(move || {
         let pursued = block_on(caller.pursue(ControlQosGoal::default(), LONG)).expect("accepted");
