@@ -9,6 +9,7 @@ use std::collections::BinaryHeap;
 
 use task::limits::{Interrupted, LimitPoll};
 use task::number::dense;
+use task::task::VariableId;
 
 use crate::bounds::pattern_database::Projection;
 
@@ -112,7 +113,16 @@ impl Abstraction {
         let map = StateMap::Pattern(projection.pattern_sizes().collect());
         let transitions = projection.all_transitions();
         let transitions = transitions.map(|(operator, t)| (t.source, dense(operator), t.target)).collect();
-        Self::new(map, projection.costs().len(), projection.goals().to_vec(), transitions)
+        Self::new(map, projection.size(), projection.goals().to_vec(), transitions)
+    }
+
+    pub(super) fn is_projection_to(&self, variables: &[VariableId]) -> bool {
+        match &self.map {
+            StateMap::Tree(_) => false,
+            StateMap::Pattern(pattern) => {
+                pattern.iter().map(|(variable, _)| *variable).eq(variables.iter().map(|variable| variable.0))
+            }
+        }
     }
 
     pub(super) fn len(&self) -> usize {

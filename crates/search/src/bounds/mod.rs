@@ -18,6 +18,7 @@ mod lm_cut;
 mod online_cost_partitioning;
 mod pattern_database;
 mod resources;
+mod systematic_patterns;
 
 pub use lm_cut::{LandmarkCut, landmark_cut_bound};
 pub use online_cost_partitioning::OnlineCostPartitioning;
@@ -179,7 +180,7 @@ impl Bounds {
     }
 
     /// Computes a heuristic for A\* that improves during the search: online saturated cost partitioning over
-    /// projections and Cartesian abstractions. `max_work` limits the effort for the Cartesian abstractions.
+    /// projections and Cartesian abstractions. `max_work` limits the effort to compute the abstractions.
     /// Returns `None` if every abstraction yields 0 for all states.
     ///
     /// # Errors

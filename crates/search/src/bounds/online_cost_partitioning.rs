@@ -1,6 +1,7 @@
 //! Online saturated cost partitioning \[1\] over projections and Cartesian abstractions, for A\*.
 //!
-//! The abstractions are computed once, after a search has worked for some time. Then, from time to time, an order
+//! The abstractions are computed once, after a search has worked for some time: Cartesian abstractions for goals and
+//! landmarks, and projections to systematically selected patterns. Then, from time to time, an order
 //! of the abstractions is computed for the state that is being evaluated. A\* expands states by increasing
 //! estimates of the plan cost, so this estimate is low. The cost partitioning of the order is kept if it raises
 //! the estimate of this state. The heuristic value is the maximum over all kept cost partitionings. The effort
@@ -23,6 +24,7 @@ use crate::bounds::abstraction::{Abstraction, MAX_ABSTRACTIONS, MAX_DISTANCE, Sc
 use crate::bounds::cartesian::{RefinementLimits, Subtask, cartesian_abstraction, operators_by_effect};
 use crate::bounds::fact_landmarks::fact_landmarks;
 use crate::bounds::pattern_database::Projection;
+use crate::bounds::systematic_patterns::{SelectionLimits, systematic_projections};
 
 /// Approximate upper limit on the number of abstract states and transitions of all abstractions together.
 const MAX_TRANSITIONS: usize = 1_000_000;
@@ -76,8 +78,8 @@ pub struct OnlineCostPartitioning {
     reason = "counts of what is in memory, and sums of at most MAX_ABSTRACTIONS distances of at most MAX_DISTANCE"
 )]
 impl OnlineCostPartitioning {
-    /// Computes the abstractions, with at most about `max_work` work units for the Cartesian abstractions.
-    /// Returns `None` if no abstraction is useful.
+    /// Computes the abstractions, with at most about `max_work` work units for the Cartesian abstractions, and as
+    /// many for the selection of patterns. Returns `None` if no abstraction is useful.
     pub(super) fn new<'p>(
         context: Context<'_>,
         projections: impl Iterator<Item = &'p Projection>,
@@ -103,9 +105,23 @@ impl OnlineCostPartitioning {
             work += used;
             abstractions.push(abstraction);
         }
+        let selection = SelectionLimits {
+            projections: MAX_ABSTRACTIONS - abstractions.len(),
+            transitions: remaining,
+            work: max_work,
+        };
+        let (selected, used) = systematic_projections(context, &costs, &by_effect, selection, &mut scratch)?;
+        work += used;
+        let selected_size: usize = selected.iter().map(Abstraction::size).sum();
+        remaining = remaining.saturating_sub(selected_size);
+        abstractions.extend(selected);
+        let is_selected = |projection: &Projection| {
+            abstractions.iter().any(|abstraction| abstraction.is_projection_to(&projection.pattern))
+        };
         let small = projections.filter(|projection| projection.transition_count() <= MAX_PROJECTION_SIZE);
+        let further: Vec<&Projection> = small.filter(|projection| !is_selected(projection)).collect();
         let free = MAX_ABSTRACTIONS - abstractions.len();
-        for projection in small.take(free) {
+        for projection in further.into_iter().take(free) {
             let abstraction = Abstraction::of_projection(projection);
             if abstraction.size() > remaining {
                 break;

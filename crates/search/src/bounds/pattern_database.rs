@@ -55,6 +55,38 @@ impl Projection {
         costs: &Arc<[Int]>,
     ) -> Result<Self, Interrupted> {
         let Context { task, limits } = context;
+        let mut projection = Self::without_operators(task, pattern, costs);
+        for index in limits.watch(0..task.operators.len()) {
+            projection.add_operator(task, index?);
+        }
+        projection.to_go = projection.goal_distances(costs, limits)?;
+        Ok(projection)
+    }
+
+    /// Returns the projection with the transitions of `operators`, sorted by index, and without goal distances.
+    /// Returns `None` if it has more than about `max_size` abstract states and transitions.
+    pub(super) fn of_operators(
+        task: &Task,
+        pattern: Vec<VariableId>,
+        costs: &Arc<[Int]>,
+        operators: &[u32],
+        max_size: usize,
+    ) -> Option<Self> {
+        let sizes = pattern.iter().map(|variable| task.variables[variable.index()].values.len());
+        if sizes.fold(1, usize::saturating_mul) > max_size {
+            return None;
+        }
+        let mut projection = Self::without_operators(task, pattern, costs);
+        for index in operators {
+            projection.add_operator(task, *index as usize);
+            if projection.transition_count() > max_size {
+                return None;
+            }
+        }
+        Some(projection)
+    }
+
+    fn without_operators(task: &Task, pattern: Vec<VariableId>, costs: &Arc<[Int]>) -> Self {
         let sizes: Vec<_> =
             pattern.iter().map(|variable| task.variables[variable.index()].values.len()).collect();
         let mut projection = Self {
@@ -71,31 +103,36 @@ impl Projection {
         projection.initial = projection.state(&task.initial);
         let goal = projection.required(&task.goal.facts);
         projection.goals = projection.matching(&goal);
-        for item in limits.watch(task.operators.iter().enumerate()) {
-            let (index, operator) = item?;
-            let before = projection.required(&operator.condition.facts);
-            let after = projection.required(&operator.effects);
-            let conditional: Vec<_> = operator
-                .conditional
-                .iter()
-                .map(|effect| (effect, projection.required(&effect.effects)))
-                .filter(|(_, after)| after.iter().any(Option::is_some))
-                .collect();
-            let touched = !conditional.is_empty() || before.iter().chain(&after).any(Option::is_some);
-            if touched {
-                for source in projection.matching(&before) {
-                    for target in projection.targets(source, &after, &conditional) {
-                        projection.transitions.push(Transition { source, target });
-                    }
+        projection
+    }
+
+    /// Adds the transitions of an operator. Operators are added in ascending order.
+    fn add_operator(&mut self, task: &Task, index: usize) {
+        let operator = &task.operators[index];
+        let before = self.required(&operator.condition.facts);
+        let after = self.required(&operator.effects);
+        let conditional: Vec<_> = operator
+            .conditional
+            .iter()
+            .map(|effect| (effect, self.required(&effect.effects)))
+            .filter(|(_, after)| after.iter().any(Option::is_some))
+            .collect();
+        let touched = !conditional.is_empty() || before.iter().chain(&after).any(Option::is_some);
+        if touched {
+            for source in self.matching(&before) {
+                if conditional.is_empty() {
+                    self.transitions.push(Transition { source, target: self.target(source, &after) });
+                    continue;
                 }
-                projection.operators.push((index, projection.transitions.len()));
-            } else {
-                let cost = costs[index];
-                projection.idle_cost = Some(projection.idle_cost.map_or(cost, |least: Int| least.min(cost)));
+                for target in self.targets(source, &after, &conditional) {
+                    self.transitions.push(Transition { source, target });
+                }
             }
+            self.operators.push((index, self.transitions.len()));
+        } else {
+            let cost = self.costs[index];
+            self.idle_cost = Some(self.idle_cost.map_or(cost, |least: Int| least.min(cost)));
         }
-        projection.to_go = projection.goal_distances(costs, limits)?;
-        Ok(projection)
     }
 
     /// Returns the operators with transitions, ascending by index, each with its transitions.
@@ -121,7 +158,7 @@ impl Projection {
         self.operators.binary_search_by_key(&operator, |(candidate, _)| *candidate).ok()
     }
 
-    fn size(&self) -> usize {
+    pub(super) fn size(&self) -> usize {
         self.sizes.iter().product()
     }
 
@@ -171,6 +208,19 @@ impl Projection {
                 .collect();
         }
         states
+    }
+
+    /// Returns the abstract state that the effects produce from the abstract state `source`.
+    #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value, so that no size is 0")]
+    fn target(&self, source: u32, effects: &[Option<u32>]) -> u32 {
+        let (mut index, mut factor, mut target) = (source, 1, 0);
+        for (size, effect) in self.sizes.iter().zip(effects).rev() {
+            let size = dense(*size);
+            target += effect.unwrap_or(index % size) * factor;
+            index /= size;
+            factor *= size;
+        }
+        target
     }
 
     /// Returns the abstract states that the effects may produce from the abstract state `source`. If the

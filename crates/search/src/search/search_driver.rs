@@ -290,8 +290,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         self.searches.is_empty().then(|| SearchOutcome::Unknown(self.best.clone()))
     }
 
-    /// Adds the heuristic that improves during the search to all searches. The work for its Cartesian abstractions
-    /// is limited to about half of `work`.
+    /// Adds the heuristic that improves during the search to all searches. The work for its abstractions is limited to
+    /// about `work`.
     fn add_improving_heuristic(&mut self, work: u64) {
         self.has_improving = true;
         let SearchProblem { context, bounds, .. } = self.space;
