@@ -6,7 +6,7 @@
     python3 benches/peers/field.py --table field.csv                       # coverage and times by suite, as Markdown
     python3 benches/peers/field.py --disagreements field.csv               # answers that cannot both be right
 
-The suites (classical, numeric, temporal, unsolvable) are those below `--tasks`, one directory for each domain (`data/fetch.py sources benchmarks`
+The suites (classical, numeric, temporal, unsolvable, and middle-... if asked for) are those below `--tasks`, one directory for each domain (`data/fetch.py sources benchmarks`
 fetches them), paired by `tasks.csv`; `ours` is `ours.py`. A planner runs on what it reads; temporal tasks are planned with overlapping actions. The
 limit is on processor time of the planner with all its processes, so that other load on the machine harms nobody; wall clock may be
 ten times as long. Metaplan also gets that limit by its own option, on wall clock (`--slack` times as long on a loaded machine), and
@@ -31,14 +31,16 @@ from pathlib import Path
 import ours
 import report
 from ours import data_path
-from planners import CLASSICAL, NUMERIC, PACKAGES, ROOT, TEMPORAL, planners
+from planners import CLASSICAL, FERROPLAN, NUMERIC, PACKAGES, ROOT, TEMPORAL, planners
 from process import PATIENCE, run
 
 FIELDS = ["suite", "task", "problem", "planner", "status", "cost", "verdict", "measured", "cpu_s", "wall_s", "limit_s",
           "exit", "load", "aim", "note"]
 SUITES = {"classical": CLASSICAL, "unsolvable": CLASSICAL, "temporal": TEMPORAL, "numeric": NUMERIC, "ours": None}
+# Run only if they are asked for.
+MIDDLE = {"middle-classical": CLASSICAL, "middle-optimal": CLASSICAL, "middle-numeric": NUMERIC, "middle-temporal": TEMPORAL}
 # How far apart a planner keeps interfering happenings at least, in the decimals that it prints, where that is less than a thousandth.
-TOLERANCE = {"kairos": "0.00099", "kairos-first": "0.00099", "lpg": "0.0002"}
+TOLERANCE = {"kairos": "0.00099", "kairos-first": "0.00099", "lpg": "0.0002", "ferroplan": "0.00099"}
 
 Task = namedtuple("Task", "suite name problem kind files optimum")
 
@@ -50,7 +52,7 @@ def tasks(options, directory):
             if row["mode"] in options.suites:
                 place = options.tasks / row["mode"] / row["task"]
                 files = [str(place / row["domain"]), str(place / row["problem"])]
-                yield Task(row["mode"], row["task"], row["problem"], SUITES[row["mode"]], files, None)
+                yield Task(row["mode"], row["task"], row["problem"], {**SUITES, **MIDDLE}[row["mode"]], files, None)
     if "ours" in options.suites:
         for name, encoding, kind, domain, problem, optimum in ours.tasks(directory, options.program):
             yield Task("ours", name, encoding, kind, [domain, problem], optimum)
@@ -153,7 +155,7 @@ def main():
     parser.add_argument("--install", action="store_true", help="make it, and install the peers from PyPI")
     parser.add_argument("--program", type=Path, default=ROOT / "target" / "release" / "metaplan", help="Metaplan, which also validates")
     parser.add_argument("--tasks", type=Path, default=data_path("real/ipc"), help="the public suites")
-    parser.add_argument("--suites", type=words, default=list(SUITES), help="of " + ", ".join(SUITES))
+    parser.add_argument("--suites", type=words, default=list(SUITES), help="of " + ", ".join([*SUITES, *MIDDLE]))
     parser.add_argument("--planners", type=words, help="these only, in this order")
     parser.add_argument("--names", type=words, help="tasks whose name contains one of these only")
     parser.add_argument("--seconds", type=float, default=60, help="limit on processor time")
@@ -164,7 +166,10 @@ def main():
     parser.add_argument("--csv", default="field.csv")
     parser.add_argument("--table", metavar="CSV", nargs="+", help="only the table of files that were written before")
     parser.add_argument("--disagreements", metavar="CSV", nargs="+", help="only what cannot be right in such files; status 1 if there is any")
+    parser.add_argument("--quality", metavar="CSV", nargs="+", help="only the quality of the plans in such files")
     options = parser.parse_args()
+    if options.quality:
+        return print(report.quality(report.read(options.quality)))
     if options.table:
         return print(report.table(report.read(options.table)))
     if options.disagreements:
@@ -176,6 +181,7 @@ def main():
         if options.install:
             subprocess.run([sys.executable, "-m", "venv", str(options.venv)], check=True)
             subprocess.run([str(options.venv / "bin" / "pip"), "install", "-q", *PACKAGES], check=True)
+            subprocess.run(["cargo", "install", "-q", "--locked", "--root", str(options.venv), FERROPLAN], check=True)
     elif options.planners != ["metaplan"]:
         parser.error("--venv is needed")
     options.program = options.program.absolute()

@@ -16,6 +16,7 @@ from process import PATIENCE
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ["up-fast-downward", "up-enhsp", "kairos-planner", "up-symk", "up-lpg", "up-aries", "up-tamer", "unified-planning",
             "setuptools<81"]
+FERROPLAN = "ferroplan-cli@0.30.0"
 CLASSICAL, NUMERIC, TEMPORAL = "classical", "numeric", "temporal"
 ALL = {CLASSICAL, NUMERIC, TEMPORAL}
 
@@ -36,6 +37,7 @@ def planners(venv, program=None, slack=1, patience=PATIENCE, megabytes=4096):
     enhsp = ["java", f"-Xmx{megabytes}m", "-XX:+UseSerialGC", "-jar", str(site / "up_enhsp/ENHSP/enhsp.jar")]
     kairos = [str(venv / "bin" / "kairos"), "solve"]
     lpg = str(site / "up_lpg" / "lpg")
+    ferroplan = [str(venv / "bin" / "ff"), "--json", "--threads", "1"]
     unified = [python, str(ROOT / "benches" / "peers" / "unified.py")]
     if program is None:
         program = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" / "metaplan"
@@ -59,6 +61,7 @@ def planners(venv, program=None, slack=1, patience=PATIENCE, megabytes=4096):
                 lambda output, code, place: downward_answer(output, code, place, False)),
         Planner("fd-lmcut", {CLASSICAL}, lambda d, p, *_: [*downward, d, p, "--search", "astar(lmcut())"], downward_answer),
         Planner("symk-bd", {CLASSICAL}, lambda d, p, *_: [*symk, d, p, "--search", "sym_bd()"], downward_answer),
+        Planner("ferroplan", ALL, lambda d, p, *_: [*ferroplan, "-o", d, "-f", p], ferroplan_answer),
         Planner("enhsp-hrmax", {NUMERIC}, lambda d, p, *_: [*enhsp, "-o", d, "-f", p, "-planner", "opt-hrmax", "-npm"],
                 enhsp_answer),
         Planner("enhsp-hadd", {NUMERIC}, lambda d, p, *_: [*enhsp, "-o", d, "-f", p, "-planner", "sat-hadd", "-npm"],
@@ -102,6 +105,22 @@ def kairos_answer(output, code, anytime):
         lines = [f"{step['time']:.6f}: {step['action']} [{step['duration']:.6f}]" if timed else step["action"] for step in best["steps"]]
         return Answer("optimal" if anytime and code == 0 and not timed else "plan", best["cost"], lines)
     return Answer({11: "limit", 12: "limit", 14: "limit", 13: "refused", 2: "refused"}.get(code, "error"))
+
+
+def ferroplan_answer(output, code, _=None):
+    """It has no option for a limit, and says nothing about costs."""
+    if code in (124, -9, 137) or code != 0 and not output.strip():
+        return Answer("limit")
+    if "{" not in output:
+        return Answer("refused" if re.search(r"unsupported|not supported|parse", output, re.IGNORECASE) else "error")
+    told = json.loads(output[output.index("{"):output.rindex("}") + 1])
+    if not told.get("solved"):
+        return Answer("limit")
+    lines = []
+    for step in told["plan"]["steps"]:
+        action = f"({' '.join([step['action'], *step['args']])})"
+        lines.append(f"{step['time']:.6f}: {action} [{step['duration']:.6f}]" if "time" in step else action)
+    return Answer("plan", None, lines)
 
 
 def downward_answer(output, code, place, proves=True):

@@ -40,6 +40,24 @@ class Outputs(unittest.TestCase):
         self.assertEqual([planners.kairos_answer("", code, False).status for code in (10, 11, 13, 1)],
                          ["unsolvable", "limit", "refused", "error"])
 
+    def test_quality(self):
+        one = row("a", "plan", "4", "valid", "4")
+        best = row("b", "plan", "", "valid", "2")
+        wrong = row("c", "plan", "1", "invalid")
+        some = {key: {**told, "aim": "minimize"} for key, told in rows("classical", one, best, wrong).items()}
+        lines = report.quality(some).splitlines()[2:]
+        self.assertEqual(lines, ["| classical | a | 1 | 1 | 0.5 |", "| classical | b | 1 | 1 | 1.0 |", "| classical | c | 1 | 0 | 0.0 |"])
+
+    def test_ferroplan(self):
+        steps = [{"index": 0, "action": "MOVE", "args": ["A", "B"], "time": 0.002, "duration": 5.0}]
+        told = json.dumps({"solved": True, "mode": "temporal", "plan": {"steps": steps}})
+        self.assertEqual(planners.ferroplan_answer(told, 0), ("plan", None, ["0.002000: (MOVE A B) [5.000000]"]))
+        untimed = json.dumps({"solved": True, "plan": {"steps": [{"action": "MOVE", "args": ["A"]}]}})
+        self.assertEqual(planners.ferroplan_answer(untimed, 0).plan, ["(MOVE A)"])
+        self.assertEqual(planners.ferroplan_answer("", 124).status, "limit")
+        self.assertEqual(planners.ferroplan_answer(json.dumps({"solved": False}), 0).status, "limit")
+        self.assertEqual(planners.ferroplan_answer("error: unsupported requirement", 1).status, "refused")
+
     def test_downward(self):
         with tempfile.TemporaryDirectory() as place:
             Path(place, "sas_plan").write_text("(pick-up b)\n(stack b a)\n; cost = 2 (unit cost)\n")
