@@ -183,6 +183,29 @@ fn conclusions_about_some_individuals_are_not_proved_of_all() {
     assert!(follows_by(":A(?x) -> :C(?x) .", ":i a :A .", below));
 }
 
+/// A constraint on the values of one individual is no range of the property.
+#[test]
+fn ranges_are_not_proved_from_restrictions_of_an_individual() {
+    let restriction = ":i a [ a owl:Restriction ; owl:onProperty :d ; owl:allValuesFrom xsd:integer ] .";
+    assert!(!follows(restriction, ":d rdfs:range xsd:integer ."));
+    assert!(!follows_by(":d(:i, ?v) ^ not xsd:integer(?v) -> .", "", ":d rdfs:range xsd:integer ."));
+    assert!(follows(":d rdfs:range xsd:integer .", ":d rdfs:range xsd:integer ."));
+}
+
+/// A blank node of a question is not the blank node with the same label in the knowledge base.
+#[test]
+fn anonymous_individuals_within_expressions_are_not_looked_up() {
+    let premise = ":a :p _:x . :e a :A .";
+    let value = "[ a owl:Restriction ; owl:onProperty :p ; owl:hasValue _:z ]";
+    let absent = "[] a owl:NegativePropertyAssertion ; owl:sourceIndividual :a ; owl:assertionProperty :q ;
+        owl:targetIndividual";
+    assert!(follows(premise, ":a :p _:z ."));
+    assert!(!follows(premise, &format!("_:z a :A . :a a {value} .")));
+    assert!(!follows(premise, &format!("_:z a :A . _:y a {value} .")));
+    assert!(!follows(&format!("{absent} _:x . :e a :A ."), &format!("_:z a :A . {absent} _:z .")));
+    assert!(follows(&format!("{absent} :e ."), &format!("{absent} :e .")));
+}
+
 /// Two values of a functional property that are only restricted to datatypes can be one value.
 #[test]
 fn values_of_restrictions_may_be_equal() {

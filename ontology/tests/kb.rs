@@ -106,6 +106,47 @@ fn a_failed_component_makes_its_designs_unavailable_until_it_recovers() {
     assert_eq!(available(&engine), initial);
 }
 
+/// The status of a failed component is written as the knowledge base requires it for this component, and the shipped
+/// rules know each way. Columns: statements about the status, expected status.
+#[test]
+fn shipped_rules_know_each_status_of_a_failed_component() {
+    let boolean = "a [ a owl:Restriction ; owl:onProperty t:c_status ; owl:allValuesFrom xsd:boolean ]";
+    for (statements, expected) in [
+        ("", "\"FALSE\""),
+        ("t:c_status rdfs:range xsd:string .", "\"FALSE\""),
+        ("t:c_status rdfs:range xsd:boolean .", "\"false\"^^<http://www.w3.org/2001/XMLSchema#boolean>"),
+        ("t:c_status rdfs:range [ a rdfs:Datatype ; owl:oneOf ( \"OK\" \"ERROR\" ) ] .", "\"ERROR\""),
+        (&format!(":c {boolean} ."), "\"false\"^^<http://www.w3.org/2001/XMLSchema#boolean>"),
+        (&format!(":other {boolean} ."), "\"FALSE\""),
+    ] {
+        let text = format!(
+            "@prefix : <http://e/#> . @prefix t: <http://metacontrol.org/tomasys#> . @prefix m: <http://ros/mros#> .
+             @prefix owl: <http://www.w3.org/2002/07/owl#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+             @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+             t:Component a owl:Class . t:FunctionDesign a owl:Class . t:c_status a owl:DatatypeProperty .
+             t:requiresC a owl:ObjectProperty . m:requiredBy a owl:ObjectProperty .
+             :c a t:Component ; m:requiredBy :second . :other a t:Component .
+             :first a t:FunctionDesign ; t:requiresC :c . :second a t:FunctionDesign .
+             :third a t:FunctionDesign ; t:requiresC :other . {statements}"
+        );
+        let ontology = read_text(&text, "test", &ReadOptions::default()).expect("well-formed");
+        let mut symbols = Symbols::new();
+        let mut lowered = lower(&ontology, &mut symbols);
+        let shipped = rules::COADAPTATION_RULES;
+        let program = rules::parse_rules(shipped, "rules", &mut symbols, &rules::Prefixes::default());
+        lowered.program.rules.extend(program.expect("rules").rules);
+        let mut engine = Engine::new(symbols, lowered.program, lowered.facts).expect("stratified");
+        assert_eq!(available(&engine), ["first", "second", "third"], "{statements}");
+        let delta = change::component_status(&mut engine, "c", change::Status::Failed).expect("known");
+        let stated: Vec<String> =
+            delta.insert.iter().map(|fact| fact.display(engine.symbols()).to_string()).collect();
+        engine.apply(delta).expect("applied");
+        assert_eq!(stated, [format!("<http://metacontrol.org/tomasys#c_status>(<http://e/#c>, {expected})")]);
+        assert_eq!(available(&engine), ["third"], "{statements}");
+        assert_eq!(engine.violations(), [], "{statements}");
+    }
+}
+
 #[test]
 fn a_measurement_outside_a_requirement_makes_designs_unavailable() {
     let check = |text: &str, attribute: &str, value: &str, expected: &[&str]| {

@@ -116,6 +116,43 @@ fn annotations_of_annotations_are_kept() {
     }
 }
 
+/// Annotations of the headers of imported ontologies are not assertions about individuals after the conversion either.
+#[test]
+fn annotations_of_imported_headers_survive_conversion() {
+    let directory = tempfile::tempdir().expect("a folder");
+    let head = "@prefix : <http://e.org/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
+        @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix dcterms: <http://purl.org/dc/terms/> .";
+    let write = |name: &str, text: &str| {
+        std::fs::write(directory.path().join(name), format!("{head} {text}")).expect("written");
+    };
+    write(
+        "a.ttl",
+        "<http://a> a owl:Ontology ; owl:imports <b.ttl> . :Checked a owl:Class . owl:Thing rdfs:subClassOf :Checked . \
+         :i a :Checked ; :p 1 .",
+    );
+    write(
+        "b.ttl",
+        "<http://b> a owl:Ontology ; owl:versionInfo \"1\" ; dcterms:title \"B\" ; dcterms:license <http://cc> ; :p 2 .",
+    );
+    check(&directory.path().join("a.ttl"));
+}
+
+/// Blank nodes that are only values of annotations have labels.
+#[test]
+fn blank_values_of_annotations_are_written() {
+    let text = ":p a owl:AnnotationProperty . :C :p [ rdfs:comment \"x\" ] ; rdfs:seeAlso [ rdfs:label \"y\" ] . \
+        <http://e.org/> rdfs:seeAlso [ rdfs:label \"manual\" ] .";
+    for syntax in ALL {
+        let text = written(text, syntax).expect("writable");
+        let again =
+            read_text(&text, "again", &ReadOptions::default()).unwrap_or_else(|e| panic!("{e:?}: {text}"));
+        assert_eq!(again.annotations.len(), 3, "{syntax:?}: {text}");
+    }
+    let functional = written(text, OutputSyntax::Functional).expect("writable");
+    let labels: BTreeSet<&str> = functional.split("_:").skip(1).map(|tail| &tail[..2]).collect();
+    assert_eq!(labels.len(), 3, "{functional}");
+}
+
 fn written(text: &str, syntax: OutputSyntax) -> Result<String, String> {
     let directory = tempfile::tempdir().expect("a folder");
     let file = directory.path().join("text.ttl");

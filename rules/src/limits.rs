@@ -21,7 +21,7 @@ const BYTES_PER_CHARGE: u64 = 8;
 
 /// Maximum size of a computed value. A chain of rules that concatenate long texts would exceed the memory before the
 /// budget ends it.
-const MAX_VALUE_BYTES: u64 = 1 << 24;
+pub(crate) const MAX_VALUE_BYTES: u64 = 1 << 24;
 
 const MAX_SHOWN_CHARACTERS: usize = 40;
 

@@ -68,21 +68,26 @@ fn negated_atoms_and_comparisons_follow_changes() {
 #[test]
 fn a_failed_component_makes_designs_unavailable() {
     let stated = "t:FunctionDesign(kinect), t:FunctionDesign(lidar), t:requiresC(kinect, camera),
-        mros:requiredBy(laser, lidar), t:typeFD(fg, kinect), t:solvesO(fg, o)";
-    let script = [
-        "?t:fd_available(kinect, true)",
-        "+t:c_status(camera, \"FALSE\")",
-        "!t:fd_available(kinect, true)",
-        "?t:fd_realisability(kinect, false)",
-        "?t:o_status(o, \"IN_ERROR_COMPONENT\")",
-        "?t:fd_available(lidar, true)",
-        "+t:c_status(laser, \"FALSE\")",
-        "!t:fd_available(lidar, true)",
-        "-t:c_status(camera, \"FALSE\")",
-        "?t:fd_available(kinect, true)",
-        "!t:o_status(o, \"IN_ERROR_COMPONENT\")",
-    ];
-    check(COADAPTATION_RULES, stated, &script);
+        mros:requiredBy(laser, lidar), t:typeFD(fg, kinect), t:solvesO(fg, o), t:typeFD(fg2, lidar),
+        t:solvesO(fg2, p)";
+    for status in ["\"FALSE\"", "false", "\"ERROR\""] {
+        let script = [
+            "?t:fd_available(kinect, true)",
+            &format!("+t:c_status(camera, {status})"),
+            "!t:fd_available(kinect, true)",
+            "?t:fd_realisability(kinect, false)",
+            "?t:o_status(o, \"IN_ERROR_COMPONENT\")",
+            "?t:fd_available(lidar, true)",
+            "!t:o_status(p, \"IN_ERROR_COMPONENT\")",
+            &format!("+t:c_status(laser, {status})"),
+            "!t:fd_available(lidar, true)",
+            "?t:o_status(p, \"IN_ERROR_COMPONENT\")",
+            &format!("-t:c_status(camera, {status})"),
+            "?t:fd_available(kinect, true)",
+            "!t:o_status(o, \"IN_ERROR_COMPONENT\")",
+        ];
+        check(COADAPTATION_RULES, stated, &script);
+    }
 }
 
 #[test]
@@ -197,6 +202,32 @@ fn growing_values_exhaust_the_default_budget() {
     assert!(length < 5_000, "{text}");
     assert!(text.len() < 300, "{text}");
     assert_eq!(engine.facts().count(), 0);
+}
+
+/// The seconds of a duration have no limit: this rule adds 300 digits in each round.
+#[test]
+fn growing_durations_exhaust_the_budget() {
+    let rules = "v(?x, ?d) ^ swrlb:multiplyDayTimeDurations(?e, ?d, 1e300) -> v(?x, ?e) .";
+    let mut symbols = Symbols::new();
+    let program = parse_rules(rules, "test", &mut symbols, &Prefixes::new()).expect("rules");
+    let stated = facts(&mut symbols, "v(a, \"PT1S\"^^xsd:dayTimeDuration)");
+    let limits = Limits { steps: 10_000_000, ..Limits::default() };
+    let error = Engine::with_limits(symbols, program, stated, limits).expect_err("it never ends").to_string();
+    let (before, _) = error.rsplit_once(" characters)").expect("an abbreviated value");
+    let length: usize = before.rsplit('(').next().expect("a part").parse().expect("a length");
+    // If the length of the durations cost nothing, the last one would have 120,000 digits.
+    assert!(length < 10_000, "{error}");
+}
+
+/// Each replacement of a character by the whole text would make a value of 100 MB.
+#[test]
+fn long_replacements_exhaust_the_budget() {
+    let rule = "t(?x) ^ swrlb:replace(?y, ?x, \".\", ?x) -> u(?y) .";
+    let mut symbols = Symbols::new();
+    let program = parse_rules(rule, "test", &mut symbols, &Prefixes::new()).expect("rules");
+    let stated = facts(&mut symbols, &format!("t(\"{}\")", "x".repeat(10_000)));
+    let errors = Engine::new(symbols, program, stated).expect_err("100 MB");
+    assert_eq!(errors[0].code(), "R301");
 }
 
 #[test]

@@ -66,8 +66,12 @@ impl Questions {
 
     fn follows(&self, knowledge: &Knowledge, imports: &Imports) -> Result<(String, String, Exit), Failure> {
         let entities = knowledge.entities().to_vec();
-        let options =
-            ontology::ReadOptions { allow_missing_imports: true, known: entities, ..imports.options() };
+        let options = ontology::ReadOptions {
+            allow_missing_imports: true,
+            documents_before: knowledge.document_count(),
+            known: entities,
+            ..imports.options()
+        };
         let conclusions = ontology::read_files(&self.entails, &options)
             .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;
         let mut entailments =

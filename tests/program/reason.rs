@@ -124,6 +124,14 @@ fn queries_are_answered_with_derivations() {
         1,
         &["not shown: ClassAssertion(<http://x#Stone> <http://x#tom>)"],
     );
+    // The blank node of the question is `e`, not the blank node with this note in the knowledge base.
+    let note = format!(
+        "{prefixes} :n a owl:AnnotationProperty . :A a owl:Class . _:x a :A ; :n \"t\" . :e a :Pet ."
+    );
+    std::fs::write(directory.path().join("note.ttl"), note).expect("a file");
+    let noted = format!("{prefixes} _:x a :Pet ; :n \"t\" .");
+    let answer = metaplan_in(directory.path(), &["reason", "note.ttl", "--entails", "-"], &noted);
+    check(&answer, 1, &["follows: ClassAssertion(<http://x#Pet>", "1 of 2 statements follow"]);
     let schema = query(&["--schema"], "");
     check(&schema, 0, &["<http://x#Cat> below <http://x#Pet>\n", "<http://x#StoneCat> is always empty"]);
     let why = query(&["--why", "tom a Animal"], "");

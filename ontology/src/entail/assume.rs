@@ -3,7 +3,8 @@
 use rules::{Delta, Engine, Error, Fact, Literal, Symbols};
 
 use super::prover::{
-    ProofResult, Prover, contradiction, edge, explain, literal, member, monotone, same, value, with_facts,
+    ProofResult, Prover, contradiction, edge, explain, literal, member, monotone, same, symbol, value,
+    with_facts,
 };
 use crate::lower::lower;
 use crate::owl::{AnnotatedAxiom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression, Ontology};
@@ -201,9 +202,9 @@ impl Prover {
 }
 
 pub(super) fn values(engine: &mut Engine, property: &ObjectPropertyExpression, individual: &Iri) -> Vec<Iri> {
-    let subject = engine.symbols_mut().name(individual);
+    let subject = symbol(engine, individual);
     let (ObjectPropertyExpression::Property(iri) | ObjectPropertyExpression::Inverse(iri)) = property;
-    let predicate = engine.symbols_mut().name(iri);
+    let predicate = symbol(engine, iri);
     let forward = matches!(property, ObjectPropertyExpression::Property(_));
     let pattern = if forward { [Some(subject), None] } else { [None, Some(subject)] };
     let name = |symbol| engine.symbols().value(symbol).as_name().map(Iri::from);
@@ -225,9 +226,8 @@ pub(super) fn refuted(cases: &[Engine]) -> Option<String> {
 }
 
 pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact> {
-    let symbols = engine.symbols_mut();
-    let different = symbols.name(owl::DIFFERENT_FROM);
-    let names: Vec<_> = names.iter().map(|name| symbols.name(name)).collect();
+    let different = symbol(engine, owl::DIFFERENT_FROM);
+    let names: Vec<_> = names.iter().map(|name| symbol(engine, name)).collect();
     let pairs = names
         .iter()
         .enumerate()

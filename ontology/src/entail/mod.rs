@@ -15,11 +15,13 @@ mod range;
 mod schema;
 mod tautology;
 
+use std::fmt::Debug;
+
 use rules::{Engine, Error, Fact};
 
 use crate::error::Warning;
 use crate::horned::UNUSED_CLASS;
-use crate::owl::{ANONYMOUS, Annotation, AnnotationValue, Axiom, Iri, Ontology};
+use crate::owl::{ANONYMOUS, Annotation, AnnotationValue, Axiom, ClassExpression, Iri, Ontology};
 use crate::vocab::owl;
 use prover::Prover;
 
@@ -38,8 +40,8 @@ pub struct Entailment {
 }
 
 /// Tries to prove every axiom of `conclusions`. Axioms with anonymous individuals, which are existential
-/// variables, are proved together as one conjunctive query. Rules and unread statements are reported as not
-/// proved. For annotations see [`annotations`].
+/// variables, are proved together as one conjunctive query. Axioms with anonymous individuals within expressions,
+/// rules and unread statements are reported as not proved. For annotations see [`annotations`].
 ///
 /// # Errors
 /// Returns an error if the evaluation of the rules exceeds its budget or is interrupted.
@@ -48,11 +50,14 @@ pub fn entailments(engine: &Engine, conclusions: &Ontology) -> Result<Vec<Entail
     let inconsistency = prover.inconsistency.as_ref();
     let mut entailments = Vec::new();
     let (open, closed): (Vec<_>, Vec<_>) =
-        conclusions.axioms.iter().map(|annotated| &annotated.axiom).partition(|axiom| has_anonymous(axiom));
+        conclusions.axioms.iter().map(|annotated| &annotated.axiom).partition(|axiom| is_open(axiom));
     for axiom in closed {
         // Inconsistent knowledge entails every statement.
         let answer = match inconsistency {
             Some(reason) => Answer::Follows(format!("everything does, because {reason}\n")),
+            None if has_nested_anonymous(axiom) => {
+                Answer::Open("an anonymous individual within an expression is not decided")
+            }
             None => prover.axiom(axiom)?,
         };
         entailments.push(Entailment { statement: axiom.to_string(), answer });
@@ -121,6 +126,26 @@ fn unread(warning: &Warning) -> Option<Entailment> {
         _ => return None,
     };
     Some(Entailment { statement, answer: Answer::Open("it could not be read") })
+}
+
+/// Returns `true` if the axiom is a part of the conjunctive query.
+fn is_open(axiom: &Axiom) -> bool {
+    has_anonymous(axiom) && !has_nested_anonymous(axiom)
+}
+
+/// Returns `true` if an anonymous individual may occur in a class expression or in a negative assertion. A
+/// conjunctive query does not replace it there.
+fn has_nested_anonymous(axiom: &Axiom) -> bool {
+    let is_anonymous = |part: &dyn Debug| format!("{part:?}").contains(ANONYMOUS);
+    match axiom {
+        Axiom::ClassAssertion(ClassExpression::Class(_), _)
+        | Axiom::ObjectPropertyAssertion(..)
+        | Axiom::DataPropertyAssertion(..)
+        | Axiom::SameIndividual(_)
+        | Axiom::DifferentIndividuals(_) => false,
+        Axiom::ClassAssertion(class, _) => is_anonymous(class),
+        _ => is_anonymous(axiom),
+    }
 }
 
 fn has_anonymous(axiom: &Axiom) -> bool {

@@ -61,28 +61,32 @@ impl Prover {
     }
 }
 
+/// Returns the symbol of a name. Adding a name copies all symbols if a clone of the engine shares them. Therefore an
+/// existing name is only looked up.
+pub(super) fn symbol(engine: &mut Engine, name: &str) -> Symbol {
+    engine.symbols().find_name(name).unwrap_or_else(|| engine.symbols_mut().name(name))
+}
+
 pub(super) fn member(engine: &mut Engine, class: &str, individual: &str) -> Fact {
-    let symbols = engine.symbols_mut();
-    Fact::new(symbols.name(class), [symbols.name(individual)])
+    Fact::new(symbol(engine, class), [symbol(engine, individual)])
 }
 
 pub(super) fn edge(engine: &mut Engine, property: &ObjectPropertyExpression, from: &str, to: &str) -> Fact {
-    let symbols = engine.symbols_mut();
-    let (from, to) = (symbols.name(from), symbols.name(to));
+    let (from, to) = (symbol(engine, from), symbol(engine, to));
     match property {
-        ObjectPropertyExpression::Property(iri) => Fact::new(symbols.name(iri), [from, to]),
-        ObjectPropertyExpression::Inverse(iri) => Fact::new(symbols.name(iri), [to, from]),
+        ObjectPropertyExpression::Property(iri) => Fact::new(symbol(engine, iri), [from, to]),
+        ObjectPropertyExpression::Inverse(iri) => Fact::new(symbol(engine, iri), [to, from]),
     }
 }
 
 pub(super) fn value(engine: &mut Engine, property: &str, from: &str, value: Literal) -> Fact {
-    let symbols = engine.symbols_mut();
-    Fact::new(symbols.name(property), [symbols.name(from), symbols.literal(value)])
+    let (property, from) = (symbol(engine, property), symbol(engine, from));
+    let value = engine.symbols().find_literal(&value).unwrap_or_else(|| engine.symbols_mut().literal(value));
+    Fact::new(property, [from, value])
 }
 
 pub(super) fn same(engine: &mut Engine, left: &str, right: &str) -> Fact {
-    let symbols = engine.symbols_mut();
-    Fact::new(symbols.name(owl::SAME_AS), [symbols.name(left), symbols.name(right)])
+    Fact::new(symbol(engine, owl::SAME_AS), [symbol(engine, left), symbol(engine, right)])
 }
 
 pub(super) fn literal(literal: &crate::owl::Literal) -> Literal {

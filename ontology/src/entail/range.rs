@@ -40,21 +40,23 @@ fn contains(datatypes: &[&str], range: &DataRange) -> bool {
     }
 }
 
-/// Returns the property and the datatype of a constraint that only restricts the values of the property
-/// to the datatype; `None` for other rules.
+/// Returns the property and the datatype of a constraint that restricts the values of the property to the datatype
+/// for all individuals, without another condition; `None` for other rules.
 fn datatype_constraint(rule: &Rule) -> Option<(Symbol, Symbol)> {
     let (predicate, object, arguments) = match &rule.body[..] {
         [
             Atom::Relation { predicate, arguments: edge },
             Atom::BuiltIn { built_in: BuiltIn::OutsideDataRange, arguments },
-        ] => (*predicate, edge.get(1).copied()?, arguments),
+        ] => match edge[..] {
+            [Term::Variable(subject), Term::Variable(object)] if subject != object => {
+                (*predicate, Term::Variable(object), arguments)
+            }
+            _ => return None,
+        },
         _ => return None,
     };
-    let is_variable = |term: Term| term.as_variable().is_some();
     match (arguments[..].as_ref(), rule.head.is_empty()) {
-        ([tested, Term::Constant(datatype)], true) if *tested == object && is_variable(object) => {
-            Some((predicate, *datatype))
-        }
+        ([tested, Term::Constant(datatype)], true) if *tested == object => Some((predicate, *datatype)),
         _ => None,
     }
 }

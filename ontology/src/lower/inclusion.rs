@@ -198,6 +198,7 @@ struct InclusionGraph {
     /// Nesting depth to which restrictions are compared; 0 if the filler of every condition is a named class.
     depth: usize,
     condition_properties: HashSet<Property>,
+    condition_fillers: HashSet<ClassExpression>,
     thing: ClassExpression,
 }
 
@@ -205,19 +206,28 @@ impl InclusionGraph {
     fn new(ontology: &Ontology, conditions: HashSet<ClassExpression>) -> Self {
         let condition_properties =
             conditions.iter().filter_map(parts).map(|(property, _)| property.clone()).collect();
+        let condition_fillers: HashSet<ClassExpression> =
+            conditions.iter().filter_map(parts).map(|(_, filler)| filler.clone()).collect();
         let (classes, properties, subproperties) = (HashMap::new(), HashMap::new(), HashMap::new());
         let thing = ClassExpression::Class(Iri::from(owl::THING));
         let is_nested = |condition: &ClassExpression| {
             parts(condition).is_some_and(|(_, filler)| !matches!(filler, ClassExpression::Class(_)))
         };
         let depth = if conditions.iter().any(is_nested) { MAX_DEPTH } else { 0 };
-        let mut graph =
-            Self { classes, properties, subproperties, conditions, depth, condition_properties, thing };
-        let fillers: Vec<ClassExpression> =
-            graph.conditions.iter().filter_map(parts).map(|(_, filler)| filler.clone()).collect();
-        for filler in &fillers {
+        let mut graph = Self {
+            classes,
+            properties,
+            subproperties,
+            conditions,
+            depth,
+            condition_properties,
+            condition_fillers: HashSet::new(),
+            thing,
+        };
+        for filler in &condition_fillers {
             graph.members(filler);
         }
+        graph.condition_fillers = condition_fillers;
         for annotated in &ontology.axioms {
             match &annotated.axiom {
                 Axiom::SubClassOf(sub, sup) => graph.class(sub, sup),
@@ -306,8 +316,8 @@ impl InclusionGraph {
         including
     }
 
-    /// Returns the superclasses of a class that follow from the stated inclusions, including `class` itself. Nested
-    /// restrictions are compared up to `depth` levels.
+    /// Returns the superclasses of a class that follow from the stated inclusions, including `class` itself, if they are
+    /// fillers of conditions. Nested restrictions are compared up to `depth` levels.
     fn supers(&self, class: &ClassExpression, depth: usize, memo: &mut Memo) -> BTreeSet<ClassExpression> {
         let key = (class.clone(), depth);
         if let Some(supers) = memo.supers.get(&key) {
@@ -326,6 +336,8 @@ impl InclusionGraph {
             }
             open.extend(next.into_iter().filter(|sup| supers.insert(sup.clone())));
         }
+        // Only these are compared, and all superclasses of all classes would take quadratic memory.
+        supers.retain(|class| self.condition_fillers.contains(class));
         memo.supers.insert(key, supers.clone());
         supers
     }

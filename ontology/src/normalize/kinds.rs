@@ -90,6 +90,29 @@ pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], name
     }
 }
 
+/// Declares the undeclared properties of dropped `headers` as annotation properties. Otherwise a reader of the
+/// merged triples would take the annotations of these headers for assertions about individuals. A property that is
+/// also the subject or the object of a statement keeps the kind that follows from its use.
+pub(crate) fn declare_header_annotations(graph: &mut Graph, headers: &HashSet<Iri>) {
+    if headers.is_empty() {
+        return;
+    }
+    let (mut properties, mut nodes) = (BTreeSet::new(), HashSet::default());
+    for (_, triple) in graph.iter() {
+        let subject = named(&triple.subject);
+        nodes.extend(subject.into_iter().chain(iri_of(&triple.object)));
+        let property = triple.predicate.as_str();
+        if subject.is_some_and(|iri| headers.contains(iri)) && !is_reserved(property) {
+            properties.insert(property);
+        }
+    }
+    let properties = properties.into_iter().filter(|property| !nodes.contains(property));
+    let properties: Vec<String> = properties.map(str::to_owned).collect();
+    for property in properties {
+        state(graph, &property, owl::ANNOTATION_PROPERTY);
+    }
+}
+
 struct Kinds<'a> {
     declared: &'a Declared,
     uses: BTreeMap<String, Use>,

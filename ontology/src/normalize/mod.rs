@@ -31,6 +31,7 @@ mod swrl;
 use rustc_hash::FxHashSet;
 
 use depth::MAX_NESTING;
+pub(crate) use kinds::declare_header_annotations;
 pub(crate) use lists::MAX_PAIRED_MEMBERS;
 pub(crate) use swrl::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
 

@@ -33,7 +33,7 @@ use tracing::info_span;
 use crate::error::{Error, Errors, Warning};
 use crate::horned;
 use crate::names::{Compact, Names};
-use crate::normalize::{self, Normal};
+use crate::normalize::{self, Merged, Normal};
 use crate::owl::{Iri, Ontology, Source};
 use crate::triples::Document;
 use file::{regular_file, standard_input};
@@ -74,7 +74,7 @@ pub fn read_text(text: &str, name: &str, options: &ReadOptions) -> Result<Ontolo
 }
 
 /// Reads documents and their imports, and returns the merged triples. Only the first document keeps its header,
-/// and the result has no imports.
+/// and the result has no imports. Annotations of the other headers are kept.
 pub(crate) fn merged<P: AsRef<Path>>(
     files: &[P],
     options: &ReadOptions,
@@ -83,7 +83,9 @@ pub(crate) fn merged<P: AsRef<Path>>(
     let mut names = Names::default();
     let (documents, warnings) = closure(roots.collect(), options, &mut Vec::new(), &mut names)?;
     let keep_all = |_: &Compact| false;
-    Ok((normalize::merge(documents, &names, keep_all).graph.into_triples(), warnings))
+    let Merged { mut graph, dropped_headers, .. } = normalize::merge(documents, &names, keep_all);
+    normalize::declare_header_annotations(&mut graph, &dropped_headers);
+    Ok((graph.into_triples(), warnings))
 }
 
 enum Pending {

@@ -75,7 +75,7 @@ pub fn component_status(engine: &mut Engine, component: &str, status: Status) ->
     let spellings: Vec<Symbol> =
         spellings(status).into_iter().map(|literal| engine.symbols_mut().literal(literal)).collect();
     // If all spellings are allowed, or none is, the spelling of MROS is used.
-    let fitting = spellings.iter().copied().find(|&value| allows(engine, property, value));
+    let fitting = spellings.iter().copied().find(|&value| allows(engine, property, subject, value));
     let value = fitting.unwrap_or(spellings[0]);
     Ok(replace(engine, property, subject, Some(value)))
 }
@@ -220,9 +220,9 @@ pub fn replace(engine: &Engine, property: Symbol, subject: Symbol, value: Option
     Delta { insert: new.into_iter().collect(), delete }
 }
 
-/// Returns `true` if no constraint of the program excludes the value from the range of the property.
+/// Returns `true` if no constraint of the program excludes the value for the property of the subject.
 /// Considers enumerations and datatypes.
-fn allows(engine: &Engine, property: Symbol, value: Symbol) -> bool {
+fn allows(engine: &Engine, property: Symbol, subject: Symbol, value: Symbol) -> bool {
     let literal = |symbol| engine.symbols().value(symbol).as_literal();
     let Some(value) = literal(value) else { return true };
     let forbids = |test: &Atom, tested: &Argument| match test {
@@ -242,7 +242,12 @@ fn allows(engine: &Engine, property: Symbol, value: Symbol) -> bool {
         [Atom::Relation { predicate, arguments }, tests @ ..]
             if *predicate == property && !tests.is_empty() =>
         {
-            Some((arguments.get(1)?, tests))
+            match &arguments[..] {
+                // The constraint is about another individual.
+                [Argument::Constant(individual), _] if *individual != subject => None,
+                [_, tested] => Some((tested, tests)),
+                _ => None,
+            }
         }
         _ => None,
     });

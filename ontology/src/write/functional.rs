@@ -1,5 +1,6 @@
 //! Writes an [`Ontology`] in functional-style syntax, with full IRIs.
 
+use std::cell::Cell;
 use std::fmt::Write;
 
 use crate::owl::{
@@ -7,7 +8,11 @@ use crate::owl::{
 };
 use crate::vocab::{is_reserved, rdfs, xsd};
 
+/// Number of written blank nodes that are only values of annotations. Each of them gets its own label.
+type Blanks = Cell<usize>;
+
 pub(super) fn document(ontology: &Ontology) -> String {
+    let blanks = &Blanks::default();
     let mut text = String::from("Prefix(xsd:=<http://www.w3.org/2001/XMLSchema#>)\n\n");
     let root = ontology.sources.first();
     let iri = ontology.iri().map(|iri| format!("<{iri}>")).unwrap_or_default();
@@ -16,29 +21,30 @@ pub(super) fn document(ontology: &Ontology) -> String {
     line(&mut text, &format!("Ontology({iri}{version}"));
     let is_header = |subject: &Iri| Some(subject) == ontology.iri();
     for (_, entry) in ontology.annotations.iter().filter(|(subject, _)| is_header(subject)) {
-        line(&mut text, &annotation(entry));
+        line(&mut text, &annotation(entry, blanks));
     }
     for (kind, iri) in &ontology.entities {
         line(&mut text, &format!("Declaration({}(<{iri}>))", entity(*kind)));
     }
     for annotated in ontology.axioms.iter().filter(|annotated| has_form(&annotated.axiom)) {
-        let annotations: String = annotated.annotations.iter().map(|entry| annotation(entry) + " ").collect();
+        let annotations = annotated.annotations.iter().map(|entry| annotation(entry, blanks) + " ");
+        let annotations: String = annotations.collect();
         let axiom = annotated.axiom.to_string();
         // The annotations of an axiom follow its first parenthesis.
         line(&mut text, &axiom.replacen('(', &format!("({annotations}"), 1));
     }
     for (subject, entry) in ontology.annotations.iter().filter(|(subject, _)| !is_header(subject)) {
-        let annotations = annotations_of(ontology, subject, entry);
+        let annotations = annotations_of(ontology, subject, entry, blanks);
         if let Some(axiom) = annotation_axiom(ontology, subject, entry) {
             line(&mut text, &axiom.replacen('(', &format!("({annotations}"), 1));
             continue;
         }
-        let (property, value) = (&entry.property, value(&entry.value));
+        let (property, value) = (&entry.property, value(&entry.value, blanks));
         let subject = node(subject);
         line(&mut text, &format!("AnnotationAssertion({annotations}<{property}> {subject} {value})"));
     }
     for swrl_rule in &ontology.rules {
-        line(&mut text, &rule(swrl_rule));
+        line(&mut text, &rule(swrl_rule, blanks));
     }
     text + ")\n"
 }
@@ -80,14 +86,14 @@ fn has_form(axiom: &Axiom) -> bool {
     member_count > 1
 }
 
-fn annotations_of(ontology: &Ontology, subject: &Iri, entry: &Annotation) -> String {
+fn annotations_of(ontology: &Ontology, subject: &Iri, entry: &Annotation, blanks: &Blanks) -> String {
     let sorted = &ontology.annotation_annotations;
     let start = sorted
         .partition_point(|(other_subject, annotation, _)| (other_subject, annotation) < (subject, entry));
     let nested = sorted[start..]
         .iter()
         .take_while(|(other_subject, annotation, _)| (other_subject, annotation) == (subject, entry));
-    nested.map(|(.., nested)| annotation(nested) + " ").collect()
+    nested.map(|(.., nested)| annotation(nested, blanks) + " ").collect()
 }
 
 /// Returns the axiom about an annotation property (subproperty, domain or range) that the ontology
@@ -131,19 +137,23 @@ fn node(iri: &Iri) -> String {
     iri.strip_prefix(ANONYMOUS).map_or_else(|| format!("<{iri}>"), |label| format!("_:{label}"))
 }
 
-fn annotation(annotation: &Annotation) -> String {
-    format!("Annotation(<{}> {})", annotation.property, value(&annotation.value))
+fn annotation(annotation: &Annotation, blanks: &Blanks) -> String {
+    format!("Annotation(<{}> {})", annotation.property, value(&annotation.value, blanks))
 }
 
-fn value(value: &AnnotationValue) -> String {
+fn value(value: &AnnotationValue, blanks: &Blanks) -> String {
     match value {
         AnnotationValue::Literal(literal) => literal.to_string(),
+        AnnotationValue::Iri(iri) if **iri == *ANONYMOUS => {
+            blanks.set(blanks.get() + 1);
+            format!("_:a{}", blanks.get())
+        }
         AnnotationValue::Iri(iri) => node(iri),
     }
 }
 
-fn rule(rule: &Rule) -> String {
-    let annotations: String = rule.annotations.iter().map(|entry| annotation(entry) + " ").collect();
+fn rule(rule: &Rule, blanks: &Blanks) -> String {
+    let annotations: String = rule.annotations.iter().map(|entry| annotation(entry, blanks) + " ").collect();
     let atoms = |atoms: &[Atom]| atoms.iter().map(atom).collect::<Vec<_>>().join(" ");
     format!("DLSafeRule({annotations}Body({}) Head({}))", atoms(&rule.body), atoms(&rule.head))
 }

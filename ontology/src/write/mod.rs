@@ -2,8 +2,9 @@
 //! without imports.
 //!
 //! The RDF syntaxes contain every triple that was read, except imports and the headers of all documents but the first,
-//! with renamed blank nodes. Functional-style syntax and OWL/XML contain entities, axioms, annotations and rules; all
-//! other triples cause warnings.
+//! with renamed blank nodes. The annotations of these headers remain, and their properties are declared if necessary.
+//! Functional-style syntax and OWL/XML contain entities, axioms, annotations and rules; all other triples cause
+//! warnings.
 
 mod functional;
 mod xml;

@@ -5,11 +5,13 @@
 //!
 //! [1] W3C `XQuery` 1.0 and `XPath` 2.0 Functions and Operators, 2007.
 
+use std::cell::RefCell;
 use std::collections::HashSet;
 
 use regex::{Regex, RegexBuilder};
 
 use super::text::as_text;
+use crate::limits::MAX_VALUE_BYTES;
 use crate::literal::Literal;
 
 const SIZE_LIMIT: usize = 1 << 20;
@@ -17,8 +19,10 @@ const SIZE_LIMIT: usize = 1 << 20;
 pub(super) fn matches(arguments: &[&Literal]) -> bool {
     let texts: Option<Vec<&str>> = arguments.iter().map(|argument| as_text(argument)).collect();
     match texts.as_deref() {
-        Some([text, pattern]) => compile(pattern, "").is_some_and(|regex| regex.is_match(text)),
-        Some([text, pattern, flags]) => compile(pattern, flags).is_some_and(|regex| regex.is_match(text)),
+        Some([text, pattern]) => with_pattern(pattern, "", |regex| regex.is_match(text)) == Some(true),
+        Some([text, pattern, flags]) => {
+            with_pattern(pattern, flags, |regex| regex.is_match(text)) == Some(true)
+        }
         _ => false,
     }
 }
@@ -32,8 +36,24 @@ pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
         [text, pattern, replacement, flags] => (text, pattern, replacement, *flags),
         _ => return None,
     };
-    let regex = compile(pattern, flags).filter(|regex| !regex.is_match(""))?;
-    Some(Literal::String(regex.replace_all(text, expand(replacement)?.as_str()).into()))
+    let replacement = expand(replacement)?;
+    let replaced = |regex: &Regex| (!regex.is_match("")).then(|| replace_all(regex, text, &replacement));
+    Some(Literal::String(with_pattern(pattern, flags, replaced)??.into()))
+}
+
+/// Replaces all matches. A result above [`MAX_VALUE_BYTES`], which exhausts the budget, is not completed.
+fn replace_all(regex: &Regex, text: &str, replacement: &str) -> String {
+    let (mut result, mut end) = (String::new(), 0);
+    for captures in regex.captures_iter(text) {
+        let Some(whole) = captures.get(0) else { continue };
+        result += &text[end..whole.start()];
+        captures.expand(replacement, &mut result);
+        end = whole.end();
+        if result.len() as u64 > MAX_VALUE_BYTES {
+            return result;
+        }
+    }
+    result + &text[end..]
 }
 
 /// Returns the distinct parts of the first argument between matches of the second, in order of occurrence. Empty for
@@ -45,14 +65,15 @@ pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
         Some([text, pattern, flags]) => (text, pattern, *flags),
         _ => return Vec::new(),
     };
-    let regex = compile(pattern, flags).filter(|regex| !regex.is_match("") && !text.is_empty());
-    let Some(regex) = regex else { return Vec::new() };
-    let mut unique = HashSet::new();
-    regex
-        .split(text)
-        .filter(|token| unique.insert(*token))
-        .map(|token| Literal::String(token.into()))
-        .collect()
+    let split = |regex: &Regex| {
+        if regex.is_match("") || text.is_empty() {
+            return Vec::new();
+        }
+        let mut unique = HashSet::new();
+        let tokens = regex.split(text).filter(|token| unique.insert(*token));
+        tokens.map(|token| Literal::String(token.into())).collect()
+    };
+    with_pattern(pattern, flags, split).unwrap_or_default()
 }
 
 /// Returns the error of a pattern and its flags. A valid pattern above the size limit has no error, but
@@ -61,8 +82,32 @@ pub(super) fn fault(pattern: &str, flags: &str) -> Option<String> {
     build(pattern, flags).err().filter(|reason| !reason.contains("size limit"))
 }
 
-fn compile(pattern: &str, flags: &str) -> Option<Regex> {
-    build(pattern, flags).ok()
+struct Compiled {
+    pattern: String,
+    flags: String,
+    /// `None` if the pattern is invalid.
+    regex: Option<Regex>,
+}
+
+thread_local! {
+    /// The last pattern. Compiling takes much longer than matching, and most patterns are constants of a rule, which
+    /// are used for many matches in turn.
+    static LAST: RefCell<Option<Compiled>> = const { RefCell::new(None) };
+}
+
+/// Evaluates a function on the compiled pattern. Returns `None` if the pattern or the flags are invalid.
+fn with_pattern<T>(pattern: &str, flags: &str, evaluate: impl FnOnce(&Regex) -> T) -> Option<T> {
+    LAST.with_borrow_mut(|last| {
+        let compiled = match last.take() {
+            Some(compiled) if compiled.pattern == pattern && compiled.flags == flags => compiled,
+            _ => Compiled {
+                pattern: pattern.to_owned(),
+                flags: flags.to_owned(),
+                regex: build(pattern, flags).ok(),
+            },
+        };
+        last.insert(compiled).regex.as_ref().map(evaluate)
+    })
 }
 
 fn build(pattern: &str, flags: &str) -> Result<Regex, String> {

@@ -153,7 +153,9 @@ impl Literal {
             Self::Hexadecimal(bytes) | Self::Base64(bytes) => bytes.len(),
             Self::Decimal(value) => value.size(),
             Self::Opaque { lexical, .. } | Self::IllTyped { lexical, .. } => lexical.len(),
-            Self::Boolean(_) | Self::Float(_) | Self::Double(_) | Self::Moment(_) | Self::Duration(_) => 0,
+            Self::Moment(moment) => moment.seconds().size(),
+            Self::Duration(duration) => duration.seconds().size(),
+            Self::Boolean(_) | Self::Float(_) | Self::Double(_) => 0,
         };
         size as u64
     }

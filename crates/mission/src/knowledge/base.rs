@@ -195,6 +195,11 @@ impl Knowledge {
         &self.documents
     }
 
+    /// Number of documents, including imports and the documents that [`Knowledge::revise`] asserted.
+    pub fn document_count(&self) -> usize {
+        self.documented.ontology().sources.len()
+    }
+
     /// Number of rules in documents and rule files, without axioms. [`Knowledge::revise`] does not change it.
     pub fn rule_count(&self) -> usize {
         self.rule_count
