@@ -242,8 +242,10 @@ impl Support {
                 read.extend(rule.body.facts.iter().filter_map(|fact| support.if_basic(fact.variable)));
                 numbers.extend(support.numbers_of(&rule.body));
             }
-            let (mut read, mut numbers) = (Vec::from_iter(read), Vec::from_iter(numbers));
-            (sorted(&mut read), sorted(&mut numbers));
+            let mut read: Vec<_> = read.into_iter().collect();
+            let mut numbers: Vec<_> = numbers.into_iter().collect();
+            sorted(&mut read);
+            sorted(&mut numbers);
             for head in heads {
                 support.of[head] = (read.clone(), numbers.clone());
             }
