@@ -162,6 +162,31 @@ fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
     (together, !counts.contains(&("symmetry", 0)))
 }
 
+/// The number of level constraints is quadratic in the number of pairs of places.
+#[test]
+fn formulas_with_too_many_level_constraints_are_given_up() {
+    let domain = "(define (domain d) (:predicates (open ?a ?b) (connected ?a ?b) (done))
+      (:derived (connected ?a ?b) (or (open ?a ?b) (exists (?c) (and (connected ?a ?c) (connected ?c ?b)))))
+      (:action link :parameters (?a ?b) :precondition (not (open ?a ?b)) :effect (open ?a ?b))
+      (:action cut :parameters (?a ?b) :precondition (open ?a ?b) :effect (not (open ?a ?b)))
+      (:action finish :parameters (?a ?b) :precondition (connected ?a ?b) :effect (done)))";
+    let problem =
+        "(define (problem p) (:domain d) (:objects a b c d e f g h) (:init (open a b)) (:goal (done)))";
+    let task = ground_text((domain.to_owned(), problem.to_owned()));
+    let limits = Limits::none();
+    let clauses = |steps: usize, max_clauses: usize| {
+        let allowed = vec![vec![true; task.operators.len()]; steps];
+        let semantics = StepSemantics::Sequential;
+        let plans = PlanConstraints { allowed: &allowed, cost: None, semantics, max_clauses };
+        let encoding = Encoding::new(Context::new(&task, &limits), plans, &OnceCell::new());
+        encoding.map(|encoding| encoding.formula.clause_count())
+    };
+    let all = clauses(0, usize::MAX).expect("a small formula");
+    assert!(all > 20_000, "{all}");
+    assert_eq!(clauses(0, 10_000), None);
+    assert_eq!(clauses(1_000, usize::MAX), None);
+}
+
 #[test]
 fn parallel_steps_and_symmetry_breaking_preserve_the_optimum() {
     for backend in Backend::built_in() {

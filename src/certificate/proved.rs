@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use ::verify::front::member_directory;
+use ::verify::front::{member_directory, read_members};
+use ::verify::manifest::PLAN;
 use ::verify::{Claim, Verification, VerifiedPart};
 
 use crate::message::Message;
@@ -66,6 +67,20 @@ pub enum Theorem {
     /// It is not shown that the claim follows from the theorem, for the given reason: for example, the proved checker
     /// does not cover a construct.
     None(String),
+}
+
+impl Theorem {
+    /// Returns the answer for a certificate with this result of all checks. The parts that a theorem covers do not
+    /// suffice if another part is rejected.
+    #[must_use]
+    pub fn of_verified(self, report: &Verification) -> Self {
+        match self {
+            Self::Holds { .. } if !report.verified() => {
+                Self::None("the certificate is not verified".to_owned())
+            }
+            theorem => theorem,
+        }
+    }
 }
 
 impl ProvedChecker {
@@ -126,6 +141,9 @@ impl ProvedChecker {
             Claim::Unsolvable => ("unsolvable", &COVERED_PARTS[..]),
             Claim::Front(_) => ("front_optimal", &COVERED_FRONT_PARTS[..]),
         };
+        if let Err(reason) = require_read(directory, claim) {
+            return Ok(Theorem::None(reason));
+        }
         let answer = self.answer(directory, claim, stop)?;
         let accepted = covered.iter().all(|part| {
             let has_part = *part != "plan" || *claim != Claim::Unsolvable;
@@ -239,6 +257,18 @@ enum Answer {
 enum Ended {
     Status(i32),
     Other(String),
+}
+
+/// Returns an error if the programs would open a file of the certificate that `metaplan-verify` has not read: it could
+/// be a link or a pipe.
+fn require_read(directory: &Path, claim: &Claim) -> Result<(), String> {
+    match claim {
+        Claim::Front(front) => read_members(directory, front),
+        Claim::Unsolvable if directory.join(PLAN).symlink_metadata().is_ok() => {
+            Err(format!("`{PLAN}` does not belong to the certificate"))
+        }
+        Claim::Unsolvable | Claim::Optimal { .. } => Ok(()),
+    }
 }
 
 /// Returns `true` if the statement of the proved checker equals the claim of the certificate. They can differ,

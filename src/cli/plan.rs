@@ -11,7 +11,7 @@ use crate::planner::{Planned, PlannedFront, Planner};
 use crate::report::Positions;
 use crate::visible::visible;
 use clap::{Args, ValueEnum};
-use planner::{Backend, Config, Limits, Plan, Solution, Status, StepSemantics};
+use planner::{Backend, Config, Limits, Solution, Status, StepSemantics};
 
 use crate::cli::alternatives;
 use crate::cli::common::{Common, Exit, Failure, Format};
@@ -343,7 +343,12 @@ fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Ar
     let blocking = planned.blocking.as_ref().map(|blocking| format!("{blocking}\n"));
     let blocking = blocking.map(|text| text + &missing_text(&planned.missing_values));
     let values = objectives::values_text(planned.objectives(), &planned.values);
-    statistics + &values + &makespan + &alternatives_text.or(blocking).unwrap_or_default()
+    let overlap = if planned.may_need_overlap() { NO_OVERLAP } else { "" };
+    overlap.to_owned()
+        + &statistics
+        + &values
+        + &makespan
+        + &alternatives_text.or(blocking).unwrap_or_default()
 }
 
 fn show(
@@ -363,11 +368,14 @@ fn show(
         PlanFormat::Plansys2 => planned.spaced().map(|plan| popf_text(&plan_lines(&plan))),
         // In this format, which `validate` reads, designs that the knowledge base has added are arguments. The other
         // formats for plans are for the domain as the user wrote it, so `written` and `spaced` omit these arguments.
-        PlanFormat::Ipc => planned.solution.plan.as_ref().map(Plan::to_string),
+        PlanFormat::Ipc => planned.ipc_text(),
     }
 }
 
 const MISSING_SHOWN: usize = 10;
+
+const NO_OVERLAP: &str =
+    "only sequences of actions were considered; with `--concurrent`, actions may overlap\n";
 
 fn missing_text(missing: &[MissingValue]) -> String {
     let line = |value: &MissingValue| {

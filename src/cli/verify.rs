@@ -77,7 +77,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         })?),
         None => None,
     };
-    Ok(show(&watch.end(report), theorem.as_ref(), format))
+    let report = watch.end(report);
+    let theorem = theorem.map(|theorem| theorem.of_verified(&report));
+    Ok(show(&report, theorem.as_ref(), format))
 }
 
 fn show(report: &Verification, theorem: Option<&Theorem>, format: Format) -> Exit {

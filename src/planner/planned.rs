@@ -1,9 +1,11 @@
 //! Results of planning a mission, and their conversion to answers, certificates and pictures.
 
+use std::collections::HashSet;
 use std::path::Path;
 
-use pddl::ast::Problem;
-use planner::{Alternatives, Exact, ExactTask, Front, Limits, Plan, Solution, Status, Task};
+use pddl::ast::{Action, ActionBody, Effect, EffectTime, Name, Problem};
+use pddl::visit::Node;
+use planner::{Alternatives, Exact, ExactTask, Front, Limits, Plan, Solution, Status, Step, Task};
 
 use crate::answers::{Objective, ParetoAnswer, PlanAnswer, Preparation};
 use crate::certificate::{self, Contents};
@@ -115,10 +117,29 @@ impl Planned<'_> {
         matches!(self.task, Ground::Concurrent { .. })
     }
 
+    /// Returns `true` if there is no sequence of actions, but overlapping actions, which were not considered, may reach
+    /// the goal: an action adds an atom at its start and deletes it at its end.
+    pub fn may_need_overlap(&self) -> bool {
+        let is_unsolvable = self.solution.status == Status::Unsolvable && !self.overlaps();
+        is_unsolvable && self.mission.domain().actions.iter().any(adds_for_its_duration)
+    }
+
     /// Returns the plan with the arguments as in the domain's file, i.e. without the designs that
     /// the knowledge base has added as arguments.
     pub fn written(&self) -> Option<Plan> {
         self.solution.plan.clone().map(|plan| self.mission.written(plan))
+    }
+
+    /// Returns the plan in the format of the planning competitions. Times are written wherever `validate` needs them:
+    /// if actions overlap, or if one is durative, because its duration may be chosen.
+    pub fn ipc_text(&self) -> Option<String> {
+        let plan = self.solution.plan.as_ref()?;
+        let durative = self.mission.domain().actions.iter();
+        let durative = durative.filter(|action| matches!(action.body, ActionBody::Durative { .. }));
+        let durative: HashSet<&Name> = durative.map(|action| &action.identifier.name).collect();
+        let is_durative = |step: &Step| durative.contains(&Name::new(&step.action));
+        let is_timed = self.overlaps() || plan.steps.iter().any(is_durative);
+        Some(if is_timed { plan.timed_text() } else { plan.to_string() })
     }
 
     /// Returns the plan with the gaps between actions that PlanSys2 needs, or unchanged if gaps would make the
@@ -173,6 +194,23 @@ impl Planned<'_> {
         let context = Seen { mission: self.mission, problem: &self.problem, positions };
         plan_picture(context, &self.solution)
     }
+}
+
+fn adds_for_its_duration(action: &Action) -> bool {
+    let ActionBody::Durative { effects, .. } = &action.body else { return false };
+    let (mut added, mut deleted) = (HashSet::new(), HashSet::new());
+    for (time, effect) in effects {
+        effect.walk(&mut |node| match (time, node) {
+            (EffectTime::AtStart, Node::Effect(Effect::Add(atom))) => {
+                added.insert(&atom.predicate.name);
+            }
+            (EffectTime::AtEnd, Node::Effect(Effect::Delete(atom))) => {
+                deleted.insert(&atom.predicate.name);
+            }
+            _ => {}
+        });
+    }
+    !added.is_disjoint(&deleted)
 }
 
 impl PlannedFront<'_> {

@@ -20,7 +20,7 @@ pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) 
         action: Name::new(&step.action),
         arguments: step.arguments.iter().map(|argument| Name::new(argument)).collect(),
         start: Some(step.start.to_rational()),
-        duration: (!step.duration.is_zero()).then(|| step.duration.to_rational()),
+        duration: Some(step.duration.to_rational()),
         line: 0,
     });
     let text = PlanText { steps: text.collect() };

@@ -54,7 +54,10 @@ fn concurrency_can_be_required() {
         std::fs::write(directory.path().join(name), text).expect("a file");
     }
     let files = ["domain.pddl", "problem.pddl"];
-    assert_eq!(metaplan_in(directory.path(), &[&["plan"][..], &files].concat(), "").status, 10);
+    let sequential = metaplan_in(directory.path(), &[&["plan"][..], &files].concat(), "");
+    assert_eq!(sequential.status, 10);
+    let hint = "only sequences of actions were considered; with `--concurrent`, actions may overlap\n";
+    assert!(sequential.stdout.contains(hint), "{sequential:#?}");
     let arguments = ["--concurrent", "--format", "json"];
     let answer = metaplan_in(directory.path(), &[&["plan"][..], &files, &arguments].concat(), "");
     let arguments = ["-", "--concurrent"];
@@ -98,5 +101,36 @@ fn missions_are_planned_with_separation() {
         let file = format!("{}/missions/{mission}.toml", env!("CARGO_MANIFEST_DIR"));
         let answer = metaplan(&["plan", &file, "--concurrent", "--format", "json"]).json();
         assert_eq!((&answer["status"], &answer["cost"]), (&json!(status), &json!(cost)), "{mission}");
+    }
+}
+
+/// `validate` needs the start of each action, and each duration that the planner has chosen, even if it is 0.
+#[test]
+fn plans_that_take_no_time_are_written_with_their_times() {
+    let durative = |duration: &str| {
+        format!("(:durative-action a :parameters () :duration {duration} :condition () :effect (at end (p)))")
+    };
+    let instantaneous = "(:action a :parameters () :effect (p)) (:action b :parameters () :effect (q))";
+    let (a, b) = ("0.000: (a)  [0.000]\n", "0.000: (b)  [0.000]\n");
+    let longest = "(:metric maximize (total-time))";
+    for (actions, goal, metric, options, expected) in [
+        (durative("(>= ?duration 0)"), "(p)", "", &["--concurrent"][..], a.to_owned()),
+        (durative("()"), "(p)", "", &["--concurrent"], a.to_owned()),
+        (durative("(<= ?duration 0)"), "(p)", longest, &[], a.to_owned()),
+        (instantaneous.to_owned(), "(p) (q)", "", &["--concurrent"], [a, b].concat()),
+        (instantaneous.to_owned(), "(p) (q)", "", &[], "(a)\n(b)\n".to_owned()),
+    ] {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let domain = format!("(define (domain d) (:predicates (p) (q)) {actions})");
+        let problem = format!("(define (problem n) (:domain d) (:init) (:goal (and {goal})) {metric})");
+        for (name, text) in [("domain.pddl", domain), ("problem.pddl", problem)] {
+            std::fs::write(directory.path().join(name), text).expect("a file");
+        }
+        let plan = ["plan", "domain.pddl", "problem.pddl", "--plan-format", "ipc"];
+        let plan = metaplan_in(directory.path(), &[&plan[..], options].concat(), "");
+        assert_eq!(plan.stdout, expected, "{actions}: {}", plan.stderr);
+        let validate = ["validate", "domain.pddl", "problem.pddl", "-"];
+        let verdict = metaplan_in(directory.path(), &[&validate[..], options].concat(), &plan.stdout);
+        assert_eq!(verdict.status, 0, "{actions}: {}{}", verdict.stdout, verdict.stderr);
     }
 }

@@ -208,6 +208,52 @@ fn reason_without_a_theorem_is_printed() {
     assert!(outcome.status == 30 && outcome.stdout.ends_with(line), "{outcome:#?}");
 }
 
+/// If another part than those of the theorem is rejected, the last line does not claim a proof.
+#[test]
+#[cfg(unix)]
+fn no_theorem_is_named_for_a_rejected_certificate() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ugv = certificate(folder.path(), &["plan", "missions/ugv.toml"]);
+    let programs = stubs("echo evidence", "echo 'proved: the plan of 4 steps is optimal, metric 408'");
+    add_stub(programs.path(), "metaplan-proved-knowledge", KNOWN);
+    for (component, status) in [(&[] as &[&str], 0), (&["--fail", "c_kinect"], 30)] {
+        let arguments = [&["--mission", "missions/ugv.toml"][..], component].concat();
+        let outcome = with_stubs(&ugv, &programs, &arguments);
+        assert_eq!(outcome.status, status, "{outcome:#?}");
+        let refused = "NOT proved by a theorem: the certificate is not verified\n";
+        assert_eq!(outcome.stdout.ends_with(refused), status != 0, "{outcome:#?}");
+        assert_eq!(outcome.stdout.contains("\nproved: "), status == 0, "{outcome:#?}");
+    }
+}
+
+/// The proved checker also reads files that the manifest does not list.
+#[test]
+#[cfg(unix)]
+fn programs_open_only_files_that_were_read() {
+    use std::os::unix::fs::symlink;
+    let folder = tempfile::tempdir().expect("a folder");
+    let [stuck, front] = ["stuck", "front"].map(|name| {
+        let copy = folder.path().join(name);
+        copy_folder(&root().join(STORED).join(name), &copy);
+        copy
+    });
+    symlink("/dev/null", stuck.join("plan.txt")).expect("a link");
+    let second = front.join("2");
+    std::fs::remove_dir_all(&second).expect("removed");
+    symlink(root().join(STORED).join("front/2"), &second).expect("a link");
+    let programs = stubs("echo evidence", "echo 'proved: there is no plan'");
+    add_stub(programs.path(), "metaplan-proved-front", "echo 'proved: the front has exactly these values: '");
+    for (certificate, reason, status) in [
+        (&stuck, "`plan.txt` does not belong to the certificate", 1),
+        (&front, "2: there is no such directory", 30),
+    ] {
+        let outcome = with_stubs(&certificate.display().to_string(), &programs, &[]);
+        assert_eq!(outcome.status, status, "{outcome:#?}");
+        let line = format!("NOT proved by a theorem: {reason}\n");
+        assert!(outcome.stdout.ends_with(&line), "{outcome:#?}");
+    }
+}
+
 #[test]
 #[cfg(unix)]
 fn programs_are_called_with_certificate_and_evidence() {

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::certificate::{certificate, change};
-use crate::common::{metaplan, root, verify_in};
+use crate::common::{metaplan, outcome, program, root, verify_in};
 
 #[test]
 fn both_programs_give_the_same_refusals() {
@@ -99,4 +99,17 @@ fn certificates_of_other_metrics_are_not_about_the_mission() {
         let reason = "failed: it is not about `ugv` as it is now: the metric differs (`--minimize`)";
         assert_eq!(!outcome.stdout.contains(reason), is_about_mission, "{outcome:#?}");
     }
+}
+
+/// Temporary files would remain if the verification ended at a limit, and a certificate can contain any number of rule
+/// files.
+#[test]
+#[cfg(unix)]
+fn certificates_are_verified_without_temporary_files() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
+    let program = program().display().to_string();
+    let verify = ["TMPDIR=/dev/null", &program, "verify", &target];
+    let outcome = outcome(Path::new("env"), &root(), &verify, "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
 }

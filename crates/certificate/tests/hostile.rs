@@ -255,6 +255,35 @@ fn a_duration_of_total_cost_without_a_value_is_zero() {
     }
 }
 
+/// A duration at end is that of the state after the start effects, in which `x` is 5. The witness contains only the
+/// values of `x` between actions.
+#[test]
+fn durations_at_end_over_changing_functions_are_rejected() {
+    let duration = ["(at end (= ?duration (x)))", "(and (>= ?duration 1) (at end (<= ?duration (x))))"];
+    for (duration, effect) in [(duration[0], "(assign (x) 5)"), (duration[1], "(increase (x) 5)")] {
+        let domain = format!(
+            "(define (domain d) (:predicates (done)) (:functions (x) (y))
+              (:durative-action a :parameters () :duration {duration} :condition ()
+                :effect (and (at start {effect}) (at end (assign (x) 0)) (at end (done)))))"
+        );
+        let verdict = |domain: &str| {
+            let problem = "(define (problem p) (:domain d) (:init (= (x) 0) (= (y) 0)) (:goal (done)))";
+            let (domain, problem) = read(domain, problem);
+            let nothing = task("", &["(done)"], &[]);
+            let nothing = nothing.replace(r#""goal": {"facts": [[1, 0]]}"#, r#""goal": {"facts": [[0, 0]]}"#);
+            let witness = r#"{"format": "metaplan-witness/1", "atoms": [], "numbers": [["(x)", "0", "0"]]}"#;
+            faithful(&domain, &problem, &nothing, witness, &|| false)
+        };
+        let is_unsupported =
+            |verdict: &Faithful| matches!(verdict, Faithful::Undecided(Cause::Unsupported { .. }));
+        let changing = verdict(&domain);
+        assert!(is_unsupported(&changing), "{changing:?}");
+        // No action changes `y`.
+        let constant = verdict(&domain.replace("?duration (x)", "?duration (y)"));
+        assert!(!is_unsupported(&constant), "{constant:?}");
+    }
+}
+
 const STAGES: &str = "(define (domain d) (:predicates (idle) (loading) (loaded) (done))
   (:action begin :parameters () :precondition (idle) :effect (and (not (idle)) (loading)))
   (:action load :parameters () :precondition (loading) :effect (and (not (loading)) (loaded)))

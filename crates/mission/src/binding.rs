@@ -608,18 +608,12 @@ impl Fill<'_> {
         }
     }
 
-    /// Returns `true` if one of these objects can be an argument of a parameter with this type. As in the check of the
-    /// problem, an object without a type, or with an undeclared one, can be.
+    /// Returns `true` if one of these objects can be an argument of a parameter with this type.
     fn admits(&self, domain: &Domain, r#type: &TypeExpression, names: &HashSet<Name>) -> bool {
-        let (hierarchy, root) = (&self.hierarchy, Name::new("object"));
-        let is_free = |own: &TypeExpression| {
-            own.alternatives.iter().all(|own| own.name == root)
-                || own.alternatives.iter().any(|own| !hierarchy.contains(&own.name))
-        };
         // The designs of the knowledge base are the last objects.
         let objects = self.problem.objects.iter().rev().chain(&domain.constants);
         let mut objects = objects.filter(|object| names.contains(&object.identifier.name));
-        objects.any(|object| is_free(&object.r#type) || hierarchy.fits(&object.r#type, r#type))
+        objects.any(|object| self.hierarchy.admits(&object.r#type, r#type))
     }
 
     fn values(&mut self, domain: &Domain, declared: &Declaration, bindings: &Bindings) {

@@ -77,6 +77,15 @@ impl TypeHierarchy {
             || subtype.alternatives.iter().any(|lower| is_subtype(&lower.name))
     }
 
+    /// Returns `true` if the check of a problem allows an object of type `object` as an argument of a parameter of type
+    /// `parameter`. An object without a type, or with an undeclared one, is allowed.
+    pub fn admits(&self, object: &TypeExpression, parameter: &TypeExpression) -> bool {
+        let mut types = object.alternatives.iter().map(|alternative| self.index.get(&alternative.name));
+        self.fits(object, parameter)
+            || types.clone().all(|index| index == Some(&0))
+            || types.any(|index| index.is_none())
+    }
+
     /// Returns `true` if some object can be of both types: an alternative of one is a subtype of an
     /// alternative of the other, or two alternatives have a common subtype. An undeclared type
     /// overlaps with every type.

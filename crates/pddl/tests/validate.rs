@@ -213,6 +213,56 @@ fn overlapping_plans_of_a_temporal_task_are_judged() {
     );
 }
 
+/// Creates a task with one action that changes `y` to 5 at its start and reaches the goal at its end. `x` is 5, and
+/// `(q)` never holds.
+fn lasting(duration: &str, condition: &str) -> (ast::Domain, ast::Problem) {
+    let domain = format!(
+        "(define (domain d) (:predicates (q) (g)) (:functions (x) (y))
+         (:durative-action go :parameters () :duration {duration} :condition {condition}
+          :effect (and (at start (assign (y) 5)) (at end (g)))))"
+    );
+    parse(&domain, "(define (problem p) (:domain d) (:init (= (x) 5) (= (y) 0)) (:goal (g)))")
+}
+
+/// A condition over all does not apply to the duration 0, but to each positive one.
+#[test]
+fn tolerances_do_not_allow_the_duration_0() {
+    for (duration, plan, expected) in [
+        ("(and (> ?duration 0) (<= ?duration 5))", "0: (go) [0]", "1 duration"),
+        ("(>= ?duration 0.001)", "0: (go) [0]", "1 duration"),
+        ("(at end (>= ?duration 0.001))", "0: (go) [0]", "1 duration"),
+        ("(>= ?duration 0.001)", "0: (go) [0.0005]", "1 over_all (q)"),
+        ("(= ?duration 0.001)", "0: (go) [0]", "1 over_all (q)"),
+        ("(>= ?duration 0)", "0: (go) [0]", "valid time=0 (y)=5"),
+    ] {
+        let task = lasting(duration, "(over all (q))");
+        check(&task, &[(plan, expected)]);
+        check_concurrent(&task, &[(plan, expected)]);
+    }
+    let generous = Options::default().with_tolerance(BigRational::from_integer(1.into()));
+    let verdict = run(&lasting("(>= ?duration 1)", "(over all (q))"), "0: (go) [0]", &generous);
+    assert_eq!(summary(&verdict), "1 duration");
+}
+
+#[test]
+fn durations_at_end_are_known_at_the_start_if_they_are_constant() {
+    for (duration, plan, expected) in [
+        ("(at end (= ?duration 5))", "0: (go)", "valid time=5 (y)=5"),
+        ("(at end (= ?duration (x)))", "0: (go)", "valid time=5 (y)=5"),
+        ("(at end (= ?duration (x)))", "0: (go) [6]", "1 duration"),
+        ("(and (at start (>= ?duration 6)) (at end (= ?duration 5)))", "0: (go)", "1 duration"),
+        ("(at end (= ?duration (y)))", "0: (go)", "1 duration"),
+        ("(at end (= ?duration (y)))", "0: (go) [5]", "valid time=5 (y)=5"),
+    ] {
+        let task = lasting(duration, "()");
+        check(&task, &[(plan, expected)]);
+        check_concurrent(&task, &[(plan, expected)]);
+    }
+    let chosen = Options::default().with_chosen_durations(true);
+    let verdict = run(&lasting("(at end (>= ?duration 1))", "()"), "(go)", &chosen);
+    assert_eq!(summary(&verdict), "valid time=1 (y)=5");
+}
+
 #[test]
 fn derived_predicates_are_recomputed_in_each_state() {
     let task = parse(

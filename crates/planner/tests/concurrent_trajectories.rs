@@ -81,6 +81,27 @@ fn an_action_with_objects_may_note_that_it_was_there() {
     assert_eq!((solution.status, cost.as_deref()), (Status::Optimal, Some("2")));
 }
 
+/// The constraint forbids an object of an action, which is not a condition on facts.
+#[test]
+fn forbidden_places_do_not_prevent_a_proof() {
+    let domain = "(define (domain d) (:predicates (at ?x) (way ?x ?y))
+      (:durative-action move :parameters (?x ?y) :duration (= ?duration 2)
+        :condition (and (at start (at ?x)) (at start (way ?x ?y)))
+        :effect (and (at start (not (at ?x))) (at end (at ?y)))))";
+    let short = "(way a c) (way c b)";
+    let long = "(way a c) (way c b) (way a d) (way d e) (way e b)";
+    for (ways, expected) in [(long, (Status::Optimal, Some("7"))), (short, (Status::Unsolvable, None))] {
+        let problem = format!(
+            "(define (problem n) (:domain d) (:objects a b c d e) (:init (at a) {ways}) (:goal (at b))
+              (:constraints (always (not (at c)))) (:metric minimize (total-time)))"
+        );
+        let (domain, problem) = parse(domain, &problem);
+        let solution = solve(&domain, &problem, &separation(), &Limits::none());
+        let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
+        assert_eq!((solution.status, cost.as_deref()), expected, "{ways}");
+    }
+}
+
 #[test]
 fn times_are_kept() {
     let time = "(:metric minimize (total-time))";

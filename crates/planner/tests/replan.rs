@@ -495,3 +495,30 @@ fn availability_over_all_is_required_only_with_a_duration() {
         assert_eq!(replanner.is_some(), is_suited, "{duration}, {condition}");
     }
 }
+
+/// The check accepts an object without a type as an argument of a typed parameter.
+#[test]
+fn designs_without_a_type_can_become_available() {
+    let domain = "(define (domain d) (:types function design)
+      (:predicates (fd_available ?d - design) (fd_solve_f ?d - design ?f - function) (done))
+      (:functions (total-cost) (price ?d))
+      (:action work :parameters (?d ?f) :precondition (and (fd_solve_f ?d ?f) (fd_available ?d))
+        :effect (and (done) (increase (total-cost) (price ?d)))))";
+    let problem = "(define (problem p) (:domain d) (:objects typed - design bare f)
+      (:init (fd_solve_f typed f) (fd_solve_f bare f) (= (price typed) 2) (= (price bare) 1) (= (total-cost) 0)
+        (fd_available typed))
+      (:goal (done)) (:metric minimize (total-cost)))";
+    let (domain, mut problem) = parse(domain, problem);
+    let mut replanner = new(&domain, &problem);
+    problem.init.push(InitialElement::Fact(atom("fd_available bare")));
+    let mut check = |problem: &Problem, metric: i64| {
+        let plan = live(&mut replanner, &domain, problem);
+        compare(&from_scratch(&domain, problem), &plan, &|| format!("{:?}", problem.init));
+        let ReplanOutcome::Optimal { metric: best, .. } = plan else { panic!("no plan") };
+        assert_eq!(best, BigRational::from_integer(metric.into()));
+    };
+    check(&problem, 1);
+    let typed = ["fd_available", "typed"];
+    problem.init.retain(|element| !matches!(element, InitialElement::Fact(fact) if words(fact) == typed));
+    check(&problem, 1);
+}

@@ -17,8 +17,8 @@ use num_rational::BigRational;
 use pddl::ast::{Comparison, Condition, Direction, Domain, Expression, Metric, Problem, Span};
 use pddl::{Source, print_expression, print_problem, read_objective};
 
-use crate::files::{read, text};
-use crate::manifest::{Claim, DOMAIN, FRONT, Front, PLAN, PROBLEM, VerifiedPart};
+use crate::files::{Contents, read, text};
+use crate::manifest::{Claim, DOMAIN, FRONT, Front, Manifest, PLAN, PROBLEM, VerifiedPart};
 use crate::parts::parts;
 use crate::plan::plan;
 
@@ -96,6 +96,27 @@ pub fn can_be_limited(objective: &Metric) -> bool {
 /// Returns the directory of the certificate at `position` (from 0) of a front.
 pub fn member_directory(directory: &Path, position: usize) -> PathBuf {
     directory.join((position + 1).to_string())
+}
+
+fn read_member(directory: &Path, position: usize) -> Result<(Manifest, Contents), String> {
+    let directory = member_directory(directory, position);
+    if !directory.symlink_metadata().is_ok_and(|metadata| metadata.is_dir()) {
+        return Err("there is no such directory".to_owned());
+    }
+    read(&directory)
+}
+
+/// Reads the certificates of the front in `directory`, without checking their proofs.
+///
+/// # Errors
+/// A certificate cannot be read, has a file that is not a plain file, or does not claim that a plan is optimal.
+pub fn read_members(directory: &Path, front: &Front) -> Result<(), String> {
+    let member = |position: usize| match read_member(directory, position)?.0.claim {
+        Claim::Optimal { .. } => Ok(()),
+        _ => Err("the certificate does not claim that a plan is optimal".to_owned()),
+    };
+    let numbered = |position: usize| member(position).map_err(|reason| format!("{}: {reason}", position + 1));
+    (0..=front.points.len()).try_for_each(numbered)
 }
 
 /// Checks the certificates of the front in `directory`, whose domain has the text `domain_text`. Returns a part
@@ -193,11 +214,7 @@ impl Members<'_> {
 
     /// Checks a certificate: it proves that `claimed` is the optimal metric of `problem`. Returns the text of its plan.
     fn check(&self, position: usize, problem: &Problem, claimed: &str) -> Result<String, String> {
-        let directory = member_directory(self.directory, position);
-        if !directory.symlink_metadata().is_ok_and(|metadata| metadata.is_dir()) {
-            return Err("there is no such directory".to_owned());
-        }
-        let (manifest, contents) = read(&directory)?;
+        let (manifest, contents) = read_member(self.directory, position)?;
         if manifest.claim != (Claim::Optimal { metric: claimed.to_owned() }) {
             return Err(format!("the certificate does not claim the optimal metric {claimed}"));
         }
@@ -209,6 +226,7 @@ impl Members<'_> {
                 "{PROBLEM} is not that of the front, with the metric and the limit of the point"
             ));
         }
+        let directory = member_directory(self.directory, position);
         for VerifiedPart { part, result } in parts(&directory, &manifest, &contents, self.stop) {
             result.map_err(|reason| format!("{part}: {reason}"))?;
         }

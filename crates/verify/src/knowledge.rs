@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::derivations::{self, DERIVATIONS};
 use crate::digest::digest;
-use mission::knowledge::{COADAPTATION, Knowledge, Sources, Stated, Statements, TOMASYS};
+use mission::knowledge::{COADAPTATION, Knowledge, Stated, Statements, TOMASYS};
 use mission::message::Message;
 use mission::{Bindings, Mission, Names};
 
@@ -117,21 +117,14 @@ pub(crate) fn first_message(messages: &[Message]) -> String {
 /// # Errors
 /// A description of the first error.
 pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
-    let directory = tempfile::tempdir().map_err(|error| format!("no temporary directory: {error}"))?;
-    let write = |name: &str, text: &str| {
-        let file = directory.path().join(name);
-        std::fs::write(&file, text).map_err(|error| format!("no temporary file: {error}"))?;
-        Ok::<_, String>(file)
-    };
-    let documents = vec![write(DOCUMENT, document)?];
-    let rules = origin.rules.iter().zip(1..);
-    let rules = rules
-        .map(|((_, text), number)| Ok(write(&format!("rules-{number}.swrl"), text)?.display().to_string()));
-    let rules = rules.collect::<Result<Vec<_>, String>>()?;
+    // Several files may have one name, so the texts get other names until they are parsed.
+    let names: Vec<String> = (1..=origin.rules.len()).map(|number| format!("rules-{number}.swrl")).collect();
+    let rules = names.iter().zip(&origin.rules).map(|(name, (_, text))| (name.as_str(), text.as_str()));
+    let rules: Vec<_> = rules.collect();
     // Imports would refer to documents outside of the certificate, so they are not loaded.
     let options = ReadOptions { closed: true, ..ReadOptions::default() };
-    let sources = Sources { documents, rules, options, ..Sources::default() };
-    let mut stated = Stated::read_for(&sources, &origin.domain).map_err(|messages| {
+    let stated = Stated::of_texts((DOCUMENT, document), &rules, &options, &origin.domain);
+    let mut stated = stated.map_err(|messages| {
         // The message of the reader names options that the verifier does not have.
         if messages.iter().any(|message| message.code == MISSING_IMPORT) {
             return format!("{DOCUMENT}: contains owl:imports; a certificate may not import other documents");
@@ -139,7 +132,7 @@ pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
         first_message(&messages)
     })?;
     for rule in &mut stated.program.rules {
-        let file = sources.rules.iter().position(|file| **file == *rule.identity.source);
+        let file = names.iter().position(|name| **name == *rule.identity.source);
         if let Some(position) = file {
             rule.identity.source = origin.rules[position].0.as_str().into();
         }

@@ -13,8 +13,8 @@ use crate::measure::measure;
 /// summary and the metric value. The validation is aborted when `stop` returns `true`.
 ///
 /// # Errors
-/// The plan is malformed, cannot be executed, or has no metric or one other than claimed; or the
-/// validation was aborted.
+/// The plan is malformed, contains `Solution Found`, cannot be executed, or has no metric or one other than claimed; or
+/// the validation was aborted.
 pub fn plan(
     domain: &Domain,
     problem: &Problem,
@@ -23,6 +23,10 @@ pub fn plan(
     claimed: &str,
     stop: &dyn Fn() -> bool,
 ) -> Result<(String, BigRational), String> {
+    // Other readers do not skip the steps before this text, even in a comment.
+    if text.contains(PlanText::ANNOUNCEMENT) {
+        return Err(format!("{PLAN} contains `{}`", PlanText::ANNOUNCEMENT));
+    }
     let mut plan = PlanText::parse(&Source::new(PLAN, text))
         .map_err(|errors| errors.first().map_or_else(String::new, |diagnostic| diagnostic.message.clone()))?;
     if plan.steps.iter().all(|step| step.start.is_some()) {

@@ -3,6 +3,9 @@
 
 use std::process::Command;
 
+use metaplan_verify::plan::plan;
+use pddl::{Source, read};
+
 /// Runs the program. Returns the exit status, the standard output and the standard error.
 fn run(arguments: &[&str]) -> (Option<i32>, String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_metaplan-verify")).args(arguments).output();
@@ -41,5 +44,25 @@ fn wrong_arguments_are_reported() {
         let (status, text, message) = run(arguments);
         assert_eq!((status, text.as_str()), (Some(2), ""), "{arguments:?}");
         assert!(message.starts_with("error: "), "{message}");
+    }
+}
+
+/// VAL and the proved checker read all lines of the plan of a certificate.
+#[test]
+fn steps_before_an_announced_plan_are_not_skipped() {
+    let domain = "(define (domain d) (:predicates (p) (g)) (:functions (total-cost))
+      (:action waste :parameters () :precondition () :effect (and (p) (increase (total-cost) 9)))
+      (:action go :parameters () :precondition () :effect (and (g) (increase (total-cost) 1))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0)) (:goal (g))
+      (:metric minimize (total-cost)))";
+    let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
+    let (domain, problem, _) = read.expect("PDDL");
+    let check = |text: &str, claimed: &str| {
+        plan(&domain, &problem, false, text, claimed, &|| false).map(|(summary, _)| summary)
+    };
+    assert_eq!(check("(waste)\n(go)\n", "10"), Ok("2 steps, valid, metric 10".to_owned()));
+    assert_eq!(check("; (waste)\n(go)\n", "1"), Ok("1 step, valid, metric 1".to_owned()));
+    for text in ["(waste)\n; Solution Found\n(go)\n", "Solution Found\n(go)\n"] {
+        assert_eq!(check(text, "1"), Err("plan.txt contains `Solution Found`".to_owned()), "{text}");
     }
 }

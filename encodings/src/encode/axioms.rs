@@ -13,6 +13,7 @@
 
 use std::collections::BTreeMap;
 
+use rustc_hash::FxHashSet;
 use task::number::dense;
 use task::task::{Layer, VariableId};
 
@@ -22,13 +23,18 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::numeric::is_at_least_zero;
 use crate::sat::Lit;
 
+/// Upper limit on the number of level constraints of one layer, in all steps. Their number per step is quadratic in
+/// the number of variables of the layer, and cubic for the transitive closure of a relation.
+const MAX_LEVEL_CLAUSES: usize = 30_000_000;
+
 /// Adds the clauses for derived variables before a step. `numbers` has the bits of the numeric variables
-/// before the step. Returns `None` if numbers can exceed the available bits.
+/// before the step. Returns `None` if numbers can exceed the available bits, if there are too many clauses, or if a
+/// limit is reached.
 pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -> Option<()> {
     let task = builder.task;
     for (layer, index) in task.axioms.iter().zip(0..) {
         let mut bodies: BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>> = BTreeMap::new();
-        let heads: Vec<VariableId> = layer.rules.iter().map(|rule| rule.head.variable).collect();
+        let heads: FxHashSet<VariableId> = layer.rules.iter().map(|rule| rule.head.variable).collect();
         for (rule, position) in layer.rules.iter().zip(0..) {
             let mut premises: Vec<_> =
                 rule.body.facts.iter().map(|fact| builder.variables.fact(*fact, step)).collect();
@@ -54,20 +60,26 @@ pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -
             builder.formula.add(Family::Axiom, bodies.iter().map(|(body, _)| *body).chain([!head]));
         }
         if layer.recursive {
-            levels(builder, step, layer, &bodies);
+            levels(builder, step, layer, &bodies)?;
         }
     }
     Some(())
 }
 
-/// Adds level constraints for a recursive layer, so that variables that support only each other are false.
-#[expect(clippy::arithmetic_side_effects, reason = "rounds count from 1")]
+/// Adds level constraints for a recursive layer, so that variables that support only each other are false. Returns
+/// `None` if there are too many clauses, or if a limit is reached.
+#[expect(clippy::arithmetic_side_effects, reason = "rounds count from 1, and rules are held in memory")]
 fn levels(
     builder: &mut Builder<'_>,
     step: usize,
     layer: &Layer,
     bodies: &BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>>,
-) {
+) -> Option<()> {
+    let orders = bodies.len() + bodies.values().flatten().map(|(_, below)| below.len()).sum::<usize>();
+    let clauses = orders.saturating_mul(bodies.len());
+    if clauses.saturating_mul(builder.variables.horizon() + 1) > MAX_LEVEL_CLAUSES {
+        return None;
+    }
     let rounds = dense(bodies.len());
     // `later[v][k]` is true if variable v is derived in round k + 2 or later. Every true variable
     // is derived in at most `rounds` rounds.
@@ -86,6 +98,7 @@ fn levels(
             builder.formula.add(Family::Axiom, [!pair[1], pair[0]]);
         }
         later.insert(*variable, literals);
+        builder.check().ok()?;
     }
     debug_assert!(layer.recursive);
     for (variable, bodies) in bodies {
@@ -110,5 +123,7 @@ fn levels(
             supports.push(support);
         }
         builder.formula.add(Family::Axiom, supports);
+        builder.check().ok()?;
     }
+    Some(())
 }

@@ -31,11 +31,12 @@
 //! \[2\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and
 //! algorithms for plan search, Artificial Intelligence 170(12-13), 2006.
 
+use rustc_hash::FxHashSet;
 use search::bounds::Projection;
 use std::collections::BTreeMap;
 use task::context::Context;
 use task::limits::{Interrupted, Limits};
-use task::task::{Condition, OperatorId, Task, VariableId};
+use task::task::{Condition, OperatorId, VariableId};
 use task::words;
 
 use crate::encode::builder::Builder;
@@ -96,7 +97,7 @@ impl Interference {
         if semantics == StepSemantics::Sequential {
             return Ok(None);
         }
-        let support = Support::new(task);
+        let support = Support::new(context)?;
         let mut variables: Vec<Uses> = (0..task.basic).map(|_| Uses::default()).collect();
         let mut slots = vec![Vec::new(); task.slots.len()];
         let mut numbers = vec![Vec::new(); task.initial.numbers.len()];
@@ -223,26 +224,33 @@ struct Support {
 }
 
 impl Support {
+    /// Computes the support layer by layer. The variables of one layer depend on each other, so they have the same
+    /// support.
     #[expect(clippy::arithmetic_side_effects, reason = "basic variables come first; rules are of the others")]
-    fn new(task: &Task) -> Self {
+    fn new(context: Context<'_>) -> Result<Self, Interrupted> {
+        let Context { task, limits } = context;
         let derived = task.variables.len() - task.basic;
         let mut support = Self { basic: task.basic, of: vec![(Vec::new(), Vec::new()); derived] };
-        loop {
-            let mut has_changed = false;
-            for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
-                let mut read = support.read_by(&rule.body);
+        for layer in limits.watch(&task.axioms) {
+            let layer = layer?;
+            let (mut heads, mut read) = (FxHashSet::default(), FxHashSet::default());
+            let mut numbers = FxHashSet::default();
+            for rule in limits.watch(&layer.rules) {
+                let rule = rule?;
+                heads.insert(rule.head.variable.index() - task.basic);
+                read.extend(support.read_by(&rule.body));
                 read.extend(rule.body.facts.iter().filter_map(|fact| support.if_basic(fact.variable)));
-                let numbers = support.numbers_of(&rule.body);
-                let (variables, numerics) = &mut support.of[rule.head.variable.index() - task.basic];
-                let before = (variables.len(), numerics.len());
-                variables.extend(read);
-                numerics.extend(numbers);
-                has_changed |= (sorted(variables).len(), sorted(numerics).len()) != before;
+                numbers.extend(support.numbers_of(&rule.body));
             }
-            if !has_changed {
-                return support;
+            let mut read: Vec<_> = read.into_iter().collect();
+            let mut numbers: Vec<_> = numbers.into_iter().collect();
+            sorted(&mut read);
+            sorted(&mut numbers);
+            for head in heads {
+                support.of[head] = (read.clone(), numbers.clone());
             }
         }
+        Ok(support)
     }
 
     fn if_basic(&self, variable: VariableId) -> Option<usize> {

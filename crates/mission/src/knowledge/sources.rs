@@ -55,7 +55,11 @@ impl Stated {
     /// # Errors
     /// All errors of the sources.
     pub fn read(sources: &Sources, equality: Equality) -> Result<Self, Errors> {
-        Self::read_with(sources, |_| (equality, None))
+        Self::of(
+            ontology::read_files(&sources.documents, &sources.options),
+            |symbols| parse_rule_files(&sources.rules, symbols),
+            |_| (equality, None),
+        )
     }
 
     /// Reads documents and rules for the text of a domain, without inference. A domain in PLANTA's
@@ -64,21 +68,39 @@ impl Stated {
     /// # Errors
     /// All errors of the sources.
     pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Errors> {
-        Self::read_with(sources, |ontology| match planta::wanted(ontology, domain) {
-            Some(terms) => (Equality::UncheckedUniqueNames, Some(Arc::new(terms))),
-            None => (Equality::Owl, None),
-        })
+        Self::of(
+            ontology::read_files(&sources.documents, &sources.options),
+            |symbols| parse_rule_files(&sources.rules, symbols),
+            |ontology| meaning(ontology, domain),
+        )
     }
 
-    fn read_with(
-        sources: &Sources,
+    /// Reads one document and rules like [`Stated::read_for`], but from texts. Each text has a name for messages.
+    ///
+    /// # Errors
+    /// All errors of the texts.
+    pub fn of_texts(
+        (name, document): (&str, &str),
+        rules: &[(&str, &str)],
+        options: &ReadOptions,
+        domain: &str,
+    ) -> Result<Self, Errors> {
+        Self::of(
+            ontology::read_text(document, name, options),
+            |symbols| parse_rule_texts(rules, symbols).map_err(Errors::from),
+            |ontology| meaning(ontology, domain),
+        )
+    }
+
+    fn of(
+        read: Result<Ontology, ontology::Errors>,
+        parse: impl FnOnce(&mut Symbols) -> Result<Vec<Rule>, Errors>,
         meaning: impl FnOnce(&Ontology) -> (Equality, Option<Arc<Terms>>),
     ) -> Result<Self, Errors> {
-        let read = ontology::read_files(&sources.documents, &sources.options);
         let mut errors = Vec::new();
         let mut symbols = Symbols::new();
         let mut rules_of_files = Vec::new();
-        match parse_rule_files(&sources.rules, &mut symbols) {
+        match parse(&mut symbols) {
             Ok(rules) => rules_of_files.extend(rules),
             Err(more) => errors.extend(more),
         }
@@ -110,6 +132,13 @@ impl Stated {
     }
 }
 
+fn meaning(ontology: &Ontology, domain: &str) -> (Equality, Option<Arc<Terms>>) {
+    match planta::wanted(ontology, domain) {
+        Some(terms) => (Equality::UncheckedUniqueNames, Some(Arc::new(terms))),
+        None => (Equality::Owl, None),
+    }
+}
+
 /// Returns the text of a rule file (`-` is standard input), or of shipped rules by their name.
 ///
 /// # Errors
@@ -127,7 +156,6 @@ pub fn rule_text(file: &str) -> Result<String, Message> {
     text.map_err(|error| Message::at("M101", file, None, format!("the file cannot be read: {error}")))
 }
 
-/// Parses all rule files together, because a rule may use conclusions of another file.
 fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Errors> {
     let (mut texts, mut errors) = (Vec::new(), Vec::new());
     for file in files {
@@ -137,16 +165,20 @@ fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>
         }
     }
     let texts: Vec<(&str, &str)> = texts.iter().map(|(file, text)| (file.as_str(), text.as_str())).collect();
-    match rules::parse_rules_together(&texts, symbols, &Prefixes::default(), &Syntax::default()) {
-        Ok(program) if errors.is_empty() => Ok(program.rules),
+    match parse_rule_texts(&texts, symbols) {
+        Ok(rules) if errors.is_empty() => Ok(rules),
         Ok(_) => Err(errors.into()),
-        Err(more) => {
-            let quoted = |error: &rules::Error| {
-                let message = Message::from_rules(error);
-                let text = texts.iter().find(|(file, _)| message.file.as_deref() == Some(file));
-                text.map_or(message.clone(), |(_, text)| message.with_source(text))
-            };
-            Err(errors.into_iter().chain(more.iter().map(quoted)).collect())
-        }
+        Err(more) => Err(errors.into_iter().chain(more).collect()),
     }
+}
+
+/// Parses all rule texts together, because a rule may use conclusions of another text.
+fn parse_rule_texts(texts: &[(&str, &str)], symbols: &mut Symbols) -> Result<Vec<Rule>, Vec<Message>> {
+    let program = rules::parse_rules_together(texts, symbols, &Prefixes::default(), &Syntax::default());
+    let quoted = |error: &rules::Error| {
+        let message = Message::from_rules(error);
+        let text = texts.iter().find(|(file, _)| message.file.as_deref() == Some(file));
+        text.map_or(message.clone(), |(_, text)| message.with_source(text))
+    };
+    program.map(|program| program.rules).map_err(|errors| errors.iter().map(quoted).collect())
 }

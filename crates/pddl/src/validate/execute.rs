@@ -3,9 +3,14 @@
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
 
-use crate::ast::{ActionBody, Comparison, ConditionTime, Direction, EffectTime, InitialElement};
+use crate::ast::{
+    ActionBody, Comparison, ConditionTime, Direction, DurationConstraint, EffectTime, Expression,
+    InitialElement,
+};
 use crate::number::show_number;
+use crate::visit::Node;
 
+use super::changeable::changeable_functions;
 use super::derive::derive_facts;
 use super::effects::{Changes, EffectError, Ground};
 use super::evaluate::{Evaluator, Undefined, metric};
@@ -117,8 +122,9 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 
     /// Determines the duration of a step: the exact value if an equality of the domain fixes it, else the
-    /// value stated in the plan, else a chosen value. A stated value must satisfy all duration constraints at
-    /// start within the tolerance. Without a stated value, the value of the first equality must satisfy them.
+    /// value stated in the plan, else a chosen value. A stated value must satisfy all duration constraints that
+    /// are known at the start, within the tolerance. Without a stated value, the value of the first equality must
+    /// satisfy them.
     fn duration(
         &self,
         step: &Step<'p>,
@@ -131,7 +137,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         let evaluator = self.evaluator(None);
         let mut exact = None;
         let mut bounds = Vec::new();
-        for constraint in constraints.iter().filter(|constraint| constraint.time == EffectTime::AtStart) {
+        for constraint in constraints.iter().filter(|constraint| self.is_known_at_start(constraint)) {
             let bound = evaluator
                 .value(&constraint.expression, &instance.bindings)
                 .map_err(|undefined| undefined_violation(step, time, &undefined))?;
@@ -142,8 +148,9 @@ impl<'e, 'p> Execution<'e, 'p> {
             bounds.push((constraint.operator, bound));
         }
         if let Some(duration) = step.text.duration.as_ref().or(exact.as_ref()) {
+            let slack = self.slack(exact.is_none() && duration.is_zero());
             for (operator, bound) in &bounds {
-                self.check_duration(step, time, *operator, duration, bound)?;
+                self.check_duration(step, time, (*operator, bound), duration, &slack)?;
             }
         }
         let duration = exact.or_else(|| step.text.duration.clone()).or_else(|| self.chosen_duration(&bounds));
@@ -159,6 +166,26 @@ impl<'e, 'p> Execution<'e, 'p> {
             return Err(step.violation(time, ViolationKind::Duration, message));
         }
         Ok(duration)
+    }
+
+    /// Returns `true` if a duration constraint applies at the start, or if its bound is a constant.
+    fn is_known_at_start(&self, constraint: &DurationConstraint) -> bool {
+        if constraint.time == EffectTime::AtStart {
+            return true;
+        }
+        let changeable = changeable_functions(self.world.domain);
+        let mut is_constant = true;
+        constraint.expression.walk(&mut |node| {
+            is_constant &= !matches!(node, Node::Expression(Expression::Duration(_)))
+                && node.fluent().is_none_or(|function| !changeable.contains(&function.predicate.name));
+        });
+        is_constant
+    }
+
+    /// Returns the maximum deviation of a duration from its bounds. Rounding must not make a duration 0, because
+    /// conditions over all do not apply to this duration.
+    fn slack(&self, is_instant: bool) -> BigRational {
+        if is_instant { BigRational::zero() } else { self.options.slack() }
     }
 
     /// Returns the duration that the planner chooses. `None` without [`Options::chosen_durations`], if no constraint
@@ -205,11 +232,10 @@ impl<'e, 'p> Execution<'e, 'p> {
         &self,
         step: &Step<'p>,
         time: &BigRational,
-        operator: Comparison,
+        (operator, bound): (Comparison, &BigRational),
         stated: &BigRational,
-        bound: &BigRational,
+        slack: &BigRational,
     ) -> Result<(), Box<Violation>> {
-        let slack = &self.options.slack();
         let (holds, sign) = match operator {
             Comparison::Equal => ((stated - bound).abs() <= *slack, "="),
             Comparison::LessOrEqual => (*stated <= bound + slack, "<="),
@@ -276,12 +302,14 @@ impl<'e, 'p> Execution<'e, 'p> {
         let ActionBody::Durative { duration: constraints, .. } = &running.instance.action.body else {
             return Ok(());
         };
+        let slack = self.slack(running.duration.is_zero());
         for constraint in constraints.iter().filter(|constraint| constraint.time == EffectTime::AtEnd) {
             let bound = self
                 .evaluator(Some(&running.duration))
                 .value(&constraint.expression, &running.instance.bindings)
                 .map_err(|undefined| undefined_violation(running.step, time, &undefined))?;
-            self.check_duration(running.step, time, constraint.operator, &running.duration, &bound)?;
+            let required = (constraint.operator, &bound);
+            self.check_duration(running.step, time, required, &running.duration, &slack)?;
         }
         Ok(())
     }

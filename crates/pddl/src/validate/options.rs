@@ -13,7 +13,8 @@ pub struct Options {
     /// Tolerance, in the domain's time unit; not negative. The default is 0.001.
     ///
     /// In sequential execution, the tolerance accommodates rounded plans: it limits the deviation of a stated
-    /// duration from the exact one, and the overlap of a step with the next step.
+    /// duration from the exact one, and the overlap of a step with the next step. A stated duration of 0 is not
+    /// rounded, unless an equality determines the exact one.
     ///
     /// In concurrent execution, the tolerance is the separation (epsilon): the minimum distance of
     /// interfering happenings. A stated duration may then deviate by the same amount, but at most by 0.001.

@@ -30,6 +30,9 @@ pub struct PlanStep {
 }
 
 impl PlanText {
+    /// Text before the last plan in the output of an anytime planner.
+    pub const ANNOUNCEMENT: &str = "Solution Found";
+
     /// Reads one step per line: `(move a b)` or `0.000: (move a b) [5.000]`. Comments begin with
     /// `;`. If the text contains `Solution Found`, only the lines after its last occurrence are
     /// read, and lines that begin with neither an opening parenthesis nor a digit are ignored.
@@ -45,7 +48,7 @@ impl PlanText {
     pub fn parse(source: &Source) -> Result<Self, Errors> {
         let text = source.text();
         // Anytime planners print improving plans; the last one is the best.
-        let announced = text.rfind("Solution Found");
+        let announced = text.rfind(Self::ANNOUNCEMENT);
         let begin = announced.map_or(0, |at| text[at..].find('\n').map_or(text.len(), |end| at + end + 1));
         let mut sink = Sink::new(source);
         if u32::try_from(text.len()).is_err() {

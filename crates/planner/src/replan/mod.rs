@@ -88,7 +88,7 @@ impl Replanner {
         if task.operators.iter().any(|own| may_ignore(own.schema) && own.duration.minimum() <= 0) {
             return None;
         }
-        let layout = Layout::new(Usage::of(domain, problem), available, problem, &task);
+        let layout = Layout::new(Usage::of(domain, problem), available, &full, &task);
         Some(Self { base: Arc::new(GroundBase { task, layout, requirements }), sets: Vec::new() })
     }
 
@@ -190,7 +190,7 @@ fn with_all(domain: &Domain, problem: &Problem, available: &[Name]) -> Problem {
     for declared in declared {
         let Some(parameter) = declared.parameters.first() else { continue };
         let objects = domain.constants.iter().chain(&problem.objects);
-        for object in objects.filter(|object| hierarchy.fits(&object.r#type, &parameter.r#type)) {
+        for object in objects.filter(|object| hierarchy.admits(&object.r#type, &parameter.r#type)) {
             let name = Identifier { name: object.identifier.name.clone(), span: Span::default() };
             full.init.push(InitialElement::Fact(Atom {
                 predicate: declared.identifier.clone(),

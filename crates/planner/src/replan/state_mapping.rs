@@ -24,6 +24,8 @@ pub(super) struct Layout {
     usage: Usage,
     /// Predicates with one parameter that state availability.
     assumed: Vec<Name>,
+    /// Facts about availability with which the task was grounded.
+    grounded: FxHashSet<String>,
     objects: FxHashMap<String, ObjectId>,
     /// Objects, goal, constraints and metric of all supported problems, as text.
     frame: String,
@@ -46,6 +48,7 @@ pub(super) struct ReplanState {
 }
 
 impl Layout {
+    /// Creates the mapping to a task. `problem` is the problem for which the task was grounded.
     #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value")]
     pub(super) fn new(usage: Usage, assumed: &[Name], problem: &Problem, task: &Task) -> Self {
         let names = task.object_names.iter().map(|name| name.to_ascii_lowercase());
@@ -53,6 +56,7 @@ impl Layout {
         let mut layout = Self {
             usage,
             assumed: assumed.to_vec(),
+            grounded: FxHashSet::default(),
             objects: names.zip((0..).map(ObjectId)).collect(),
             frame: frame(problem),
             facts: facts(task),
@@ -66,7 +70,9 @@ impl Layout {
             match element {
                 InitialElement::Fact(atom) => {
                     let key = key(atom);
-                    if !layout.facts.contains_key(&key) && layout.matters(atom, &key) {
+                    if assumed.contains(&atom.predicate.name) {
+                        layout.grounded.insert(key);
+                    } else if !layout.facts.contains_key(&key) && layout.matters(atom, &key) {
                         let position = layout.fixed.len();
                         layout.fixed.entry(key).or_insert(position);
                     }
@@ -134,6 +140,9 @@ impl Layout {
             InitialElement::Fact(atom) => {
                 let key = key(atom);
                 if let Some(predicate) = self.assumed.iter().position(|name| *name == atom.predicate.name) {
+                    if !self.grounded.contains(&key) {
+                        return None;
+                    }
                     let object = key.trim_end_matches(')').split_once(' ')?.1;
                     reading.available[predicate].push(*self.objects.get(object)?);
                 } else if let Some((fact, is_reached)) = self.facts.get(&key) {

@@ -96,14 +96,15 @@ impl Bounds {
         let mut patterns: Vec<Vec<_>> = goal_variables.iter().map(|variable| vec![*variable]).collect();
         let mut variables: Vec<_> = VariableId::all(task.basic).collect();
         variables.sort_by_key(|variable| std::cmp::Reverse(task.variables[variable.index()].values.len()));
-        for variable in &variables {
+        let max_patterns = goal_variables.len().saturating_add(PAIR_LIMIT);
+        'pairs: for variable in context.limits.watch(&variables) {
+            let variable = variable?;
             for goal in &goal_variables {
+                if patterns.len() >= max_patterns {
+                    break 'pairs;
+                }
                 let [goal_size, size] = [goal, variable].map(|id| task.variables[id.index()].values.len());
-                let max_patterns = goal_variables.len().saturating_add(PAIR_LIMIT);
-                if goal != variable
-                    && goal_size.saturating_mul(size) <= STATE_LIMIT
-                    && patterns.len() < max_patterns
-                {
+                if goal != variable && goal_size.saturating_mul(size) <= STATE_LIMIT {
                     patterns.push(vec![*goal.min(variable), *goal.max(variable)]);
                 }
             }

@@ -27,11 +27,12 @@ struct Rule {
     before: Vec<u32>,
     after: Vec<u32>,
     adds: Vec<u32>,
-    set: Words,
+    /// Variables that the operator sets.
+    set: Vec<VariableId>,
     /// All facts of the variables that the operator may change and does not require.
     open: Vec<u32>,
-    /// All facts of the variables that the operator requires or may change.
-    touched: Words,
+    /// Variables that the operator requires or may change.
+    touched: Vec<VariableId>,
 }
 
 /// For each fact: a bitset of the facts that are compatible with it, i.e. for which the analysis does
@@ -114,8 +115,15 @@ fn common(words: &[u64], others: &[u64]) -> Words {
     words.iter().zip(others).map(|(word, other)| word & other).collect()
 }
 
-fn without(words: &[u64], others: &[u64]) -> Words {
-    words.iter().zip(others).map(|(word, other)| word & !other).collect()
+#[expect(clippy::arithmetic_side_effects, reason = "positions in words in memory; `count` is 1 to 64")]
+fn remove_all(words: &mut [u64], facts: std::ops::Range<u32>) {
+    let mut start = facts.start;
+    while start < facts.end {
+        let next = facts.end.min((start | 63) + 1);
+        let count = next - start;
+        words[(start >> 6) as usize] &= !(u64::MAX >> (64 - count) << (start & 63));
+        start = next;
+    }
 }
 
 /// The h² mutexes of a task, from forward and backward analysis.
@@ -140,12 +148,12 @@ impl MutexPairs {
         if facts as usize > MAX_FACTS {
             return Ok(None);
         }
-        let mut builder = H2Builder { task, first, variables, facts, left: MAX_WORK };
+        let work = task.operators.len().saturating_mul((facts as usize).div_ceil(64));
+        let Some(left) = MAX_WORK.checked_sub(work).filter(|left| *left > 0) else { return Ok(None) };
+        let mut builder = H2Builder { task, first, variables, facts, left };
         let mut rules = Vec::with_capacity(task.operators.len());
         for operator in limits.watch(&task.operators) {
-            let operator = operator?;
-            builder.left = builder.left.saturating_sub(builder.words());
-            rules.push(builder.rule(operator));
+            rules.push(builder.rule(operator?));
         }
         let mut useless = vec![false; rules.len()];
         let mut alive = None;
@@ -221,23 +229,17 @@ impl<N: TaskNumber> H2Builder<'_, N> {
             !may_change(fact.variable)
                 && operator.effects.iter().all(|effect| effect.variable != fact.variable)
         };
-        let [mut set, mut touched] = [vec![0; self.words()], vec![0; self.words()]];
-        for effect in &operator.effects {
-            self.values(effect.variable).for_each(|value| insert(&mut set, value));
-        }
         let changing: Vec<VariableId> =
             operator.effects.iter().chain(&conditional).map(|fact| fact.variable).collect();
         let is_open = |variable: &&VariableId| required.clone().all(|fact| fact.variable != **variable);
         let open = changing.iter().filter(is_open).flat_map(|variable| self.values(*variable));
         let open: Vec<u32> = open.collect();
-        for variable in changing.iter().copied().chain(required.clone().map(|fact| fact.variable)) {
-            self.values(variable).for_each(|value| insert(&mut touched, value));
-        }
+        let touched = changing.iter().copied().chain(required.clone().map(|fact| fact.variable)).collect();
         Rule {
             before: required.clone().map(|fact| self.number(*fact)).collect(),
             after: unconditional.chain(required.filter(persists)).map(|fact| self.number(*fact)).collect(),
             adds: operator.effects.iter().chain(&conditional).map(|fact| self.number(*fact)).collect(),
-            set,
+            set: operator.effects.iter().map(|effect| effect.variable).collect(),
             open,
             touched,
         }
@@ -279,8 +281,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
                 if *useless {
                     continue;
                 }
-                let Some(beside) = table.beside(&rule.before, &reached) else { continue };
-                let mut beside = without(&beside, &rule.set);
+                let Some(mut beside) = table.beside(&rule.before, &reached) else { continue };
+                rule.set.iter().for_each(|variable| remove_all(&mut beside, self.values(*variable)));
                 rule.adds.iter().for_each(|fact| insert(&mut beside, *fact));
                 for fact in &rule.adds {
                     // A variable has only one value, so an added fact is incompatible with the variable's
@@ -335,9 +337,9 @@ impl<N: TaskNumber> H2Builder<'_, N> {
                 if *useless {
                     continue;
                 }
-                let Some(beside) = table.beside(&rule.after, &reached) else { continue };
+                let Some(mut state) = table.beside(&rule.after, &reached) else { continue };
                 let Some(before) = forwards.beside(&rule.before, &reachable_facts) else { continue };
-                let mut state = without(&beside, &rule.touched);
+                rule.touched.iter().for_each(|variable| remove_all(&mut state, self.values(*variable)));
                 let news =
                     || rule.before.iter().chain(&rule.open).copied().filter(|fact| has(&before, *fact));
                 news().for_each(|fact| insert(&mut state, fact));

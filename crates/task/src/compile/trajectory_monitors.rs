@@ -254,10 +254,10 @@ impl<'t> Monitors<'t> {
     }
 
     /// Returns `true` if the monitors do not restrict the times of actions: there are no deadlines, and the monitors
-    /// neither add preconditions nor make two actions interfere.
+    /// neither add preconditions about the state nor make two actions interfere.
     pub(super) fn keeps_apart_nothing(&self) -> bool {
         let is_plain = |addition: &Addition| {
-            addition.conditions.is_empty()
+            addition.conditions.iter().all(reads_nothing)
                 && addition.effects.iter().all(|effect| match effect {
                     Effect::When(condition, effect) => {
                         matches!(**effect, Effect::Add(_)) && reads_nothing(condition)

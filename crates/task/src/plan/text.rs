@@ -23,6 +23,11 @@ impl Step {
         (start.into(), duration.into())
     }
 
+    fn timed_line(&self) -> String {
+        let (start, duration) = self.times();
+        format!("{}: {}  [{}]\n", start.as_time(), self.call(), duration.as_time())
+    }
+
     /// Formats the action in PDDL: `(move a b)`.
     pub fn call(&self) -> String {
         let words: Vec<&str> =
@@ -45,21 +50,23 @@ impl Exact {
     }
 }
 
+impl Plan {
+    /// Formats the plan with start and duration of each step, even if all are 0: see the implementation of
+    /// [`fmt::Display`].
+    pub fn timed_text(&self) -> String {
+        self.steps.iter().map(Step::timed_line).collect()
+    }
+}
+
 /// Writes the plan in the format of the planning competitions, which `pddl::validate::PlanText` parses. Each step is
 /// a line `start: (action arguments)  [duration]`, or `(action arguments)` if all starts and durations are 0.
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let timed = |step: &Step| !step.duration.is_zero() || !step.start.is_zero();
-        let temporal = self.steps.iter().any(timed);
-        for step in &self.steps {
-            if temporal {
-                let (start, duration) = step.times();
-                writeln!(f, "{}: {}  [{}]", start.as_time(), step.call(), duration.as_time())?;
-            } else {
-                writeln!(f, "{}", step.call())?;
-            }
+        if self.steps.iter().any(timed) {
+            return f.write_str(&self.timed_text());
         }
-        Ok(())
+        self.steps.iter().try_for_each(|step| writeln!(f, "{}", step.call()))
     }
 }
 

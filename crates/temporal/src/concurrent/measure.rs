@@ -78,7 +78,9 @@ impl<T: TimeNumber> Measure<T> {
 pub(super) fn split(metric: &Metric) -> Result<(Rational, Metric), Error> {
     let unsupported = || Error::Unsupported {
         construct: "a metric that rewards time, or is not linear in it, where actions overlap".into(),
-        instead: "a metric that grows with `total-time`, or does not mention it".into(),
+        instead:
+            "a metric that grows with `total-time` and multiplies it by numbers only, or does not mention it"
+                .into(),
         place: metric.place,
     };
     if let Some(place) = zero_divisor(&metric.expression) {
