@@ -11,16 +11,18 @@ for theorem in Sound.sound Derived.derive_closed Axioms.stratum_closed Optimal.o
   echo "$theorem: closed under the global context"
 done
 cd ocaml
-ocamlfind ocamlopt -c checker.mli checker.ml reader.ml json.ml evidence.ml timed.ml exhaustive.ml knowledge.ml
-for program in check check_list check_front check_knowledge prepare mutants knowledge_mutants differential semantics; do
+ocamlfind ocamlopt -c checker.mli checker.ml reader.ml json.ml evidence.ml timed.ml exhaustive.ml knowledge.ml mission.ml derive.ml
+for program in check check_list check_front check_knowledge check_mission prepare mutants knowledge_mutants mission_mutants differential semantics; do
   # `metaplan verify --proved` finds its programs by these names, also in PATH.
   case $program in
     check | prepare) name=metaplan-proved-$program ;;
     check_front) name=metaplan-proved-front ;;
     check_knowledge) name=metaplan-proved-knowledge ;;
+    check_mission) name=metaplan-proved-mission ;;
     *) name=$program ;;
   esac
   # The search is for tests only.
-  case $program in mutants | differential) search=exhaustive.cmx ;; *) search= ;; esac
-  ocamlfind ocamlopt checker.cmx reader.cmx json.cmx evidence.cmx timed.cmx knowledge.cmx $search "$program.ml" -o "$name"
+  case $program in mutants | mission_mutants | differential) search=exhaustive.cmx ;; *) search= ;; esac
+  case $program in check_mission | mission_mutants) missions='mission.cmx derive.cmx' ;; *) missions= ;; esac
+  ocamlfind ocamlopt checker.cmx reader.cmx json.cmx evidence.cmx timed.cmx knowledge.cmx $missions $search "$program.ml" -o "$name"
 done
