@@ -53,8 +53,9 @@ Definition mentioned : list key := flat_map (fun p => flat_map names_in (rows I 
 Definition named_apart : bool :=
   let names := nodup Pos.eq_dec mentioned in
   forallb (fun n => forallb (fun m => negb (Pos.eqb (object_for W n) (object_for W m)) || Pos.eqb n m) names) names.
-Definition fits (orders : list (list key)) : bool :=
-  named_apart && (let values := filled_values in forallb (has_value values) bound_values) && Nat.eqb (length orders) (length (schemas W)) &&
+Definition can_fill (orders : list (list key)) : bool :=
+  named_apart && (let values := filled_values in forallb (has_value values) bound_values) &&
+  Nat.eqb (length orders) (length (schemas W)) &&
   forallb order_accepted (combine (schemas W) orders).
 End Fill.
 
@@ -62,7 +63,7 @@ Definition check_mission (W : mission) (level : key -> nat) (steps : list (data 
     (T : task) (N : names) (case : nat -> list key -> case_tree) (goal_case : case_tree)
     (A : Check.argument) (oracle : state -> list positive) (plan : list (nat * list key)) (claim : option Q) : bool :=
   let I := index_of (map fst steps) in
-  check_derivations (mission_knowledge W) level steps && fits W I orders &&
+  check_derivations (mission_knowledge W) level steps && can_fill W I orders &&
   check_certificate (fill W I orders) T N case goal_case A oracle plan claim.
 
 (* The proof *)
@@ -132,8 +133,8 @@ Lemma value_rows_in : forall p l q, In p (bound_symbols W) ->
 Proof.
   intros p l q B. unfold value_rows. rewrite in_flat_map. split.
   - intros [r [J H]]. destruct (split_row r) as [[names [q'|]]|] eqn:E; [|contradiction|contradiction].
-    destruct H as [H|[]]. injection H as <- <-. apply split_row_ok in E. split; [exact B|]. exists names. split; [reflexivity|]. subst r.
-    apply rows_index, J.
+    destruct H as [H|[]]. injection H as <- <-. apply split_row_ok in E. split; [exact B|]. exists names.
+    split; [reflexivity|]. subst r. apply rows_index, J.
   - intros [_ [names [<- J]]]. exists (map Name names ++ [Literal (Numeric q)]). split; [apply rows_index, J|].
     rewrite (proj2 (split_row_ok (map Name names ++ [Literal (Numeric q)]) names (Some q)) eq_refl).
     left. reflexivity.
@@ -182,9 +183,9 @@ Proof.
     destruct (H (a, x) (or_introl eq_refl) eq_refl).
   - intros v J. apply H. right. exact J.
 Qed.
-Theorem fill_ok : forall orders, fits W I orders = true -> filled W M (fill W I orders).
+Theorem fill_ok : forall orders, can_fill W I orders = true -> filled W M (fill W I orders).
 Proof.
-  intros orders H. unfold fits in H. rewrite !andb_true_iff in H. destruct H as [[[Ap Va] Le] Or].
+  intros orders H. unfold can_fill in H. rewrite !andb_true_iff in H. destruct H as [[[Ap Va] Le] Or].
   cbv zeta in Va. rewrite forallb_forall in Va. unfold filled. parts; try reflexivity.
   - unfold named_apart in Ap. rewrite forallb_forall in Ap.
     assert (C : forall n, mentions W M n -> In n (nodup Pos.eq_dec (mentioned W I))).

@@ -5762,9 +5762,9 @@ let named_apart w i =
       (||) (negb (Coq_Pos.eqb (w.object_for n) (w.object_for m)))
         (Coq_Pos.eqb n m)) names0) names0
 
-(** val fits0 : mission -> index -> key1 list list -> bool **)
+(** val can_fill : mission -> index -> key1 list list -> bool **)
 
-let fits0 w i orders =
+let can_fill w i orders =
   (&&)
     ((&&)
       ((&&) (named_apart w i)
@@ -5782,6 +5782,6 @@ let check_mission w level0 steps orders t0 n case goal_case a oracle plan claim 
   let i = index_of (map fst steps) in
   (&&)
     ((&&) (check_derivations w.mission_knowledge level0 steps)
-      (fits0 w i orders))
+      (can_fill w i orders))
     (check_certificate (fill w i orders) t0 n case goal_case a oracle plan
       claim)

@@ -1502,7 +1502,7 @@ val mentioned : mission -> index -> key1 list
 
 val named_apart : mission -> index -> bool
 
-val fits0 : mission -> index -> key1 list list -> bool
+val can_fill : mission -> index -> key1 list list -> bool
 
 val check_mission :
   mission -> (key1 -> nat) -> (data * reason) list -> key1 list list -> task

@@ -1,8 +1,9 @@
 (* Tests the checker of missions with random changes of the knowledge base, of its claimed facts and of the problem
-   file, for an unchanged claim and unchanged evidence. Fails if a false claim is accepted. The judge reads the facts of
-   the knowledge base without rules for bindings, writes the problem as PDDL, and searches for a better plan. For a plain
-   domain, it uses the explicit domain of the certificate, which the changes do not concern. It shares with the checker
-   the reader of PDDL, the derivations and the semantics of actions. *)
+   file, for an unchanged claim and unchanged evidence. The judge reads the facts of the knowledge base without rules
+   for bindings, and writes the problem as PDDL. For a plain domain, it uses the explicit domain of the certificate, which
+   the changes do not concern. The test fails if actions have other results than in the judge's problem, or if a claim
+   is accepted that is false for this problem. The judge shares with the checker the reader of PDDL, the derivations and
+   the semantics of actions. *)
 module C = Checker
 open Reader
 
@@ -84,6 +85,25 @@ let judged domain_text problem_text facts =
     | section -> section in
   Reader.problem domain_text (text (List (Word "define" :: head :: List.map added problem)))
 
+(* Every instance of an action has the same result in both problems: from the initial state, and from the state in which
+   also all atoms hold that actions change. *)
+let agree (problem : C.problem) (judged : Reader.problem) =
+  let other = judged.task in
+  let changed = List.filter_map (fun (is_number, p, _) -> if is_number then None else Some p) (Exhaustive.changed_heads other) in
+  let all world = { world with C.holds_in = (fun (p, l) -> List.mem p changed || world.C.holds_in (p, l)) } in
+  let signature = Exhaustive.signature judged in
+  let result pddl world action env =
+    Option.map (fun (next, d) -> signature next, C.qred d) (C.step pddl true (C.derived_world pddl world) action env) in
+  let instances pddl action = List.sort compare (C.instances pddl (fun _ -> false) action.C.parameters []) in
+  List.for_all2 (fun action other_action ->
+    let envs = instances problem action in
+    envs = instances other other_action
+    && List.for_all (fun change -> List.for_all (fun env ->
+      result problem (change (C.initial problem)) action env = result other (change (C.initial other)) other_action env) envs)
+      [Fun.id; all]) problem.C.actions other.C.actions
+
+exception Too_large
+
 (* A plan with a smaller metric, for actions that do not lower it *)
 let is_beaten (problem : Reader.problem) names bound =
   let pddl = problem.task in
@@ -99,7 +119,7 @@ let is_beaten (problem : Reader.problem) names bound =
     end in
   add (C.initial pddl) zero;
   let rec visit () =
-    if Hashtbl.length visited > 30_000 then failwith "the search is too large";
+    if Hashtbl.length visited > 30_000 then raise Too_large;
     if Queue.is_empty queue then false
     else
       let world, spent = Queue.pop queue in
@@ -127,7 +147,7 @@ let change_symbol symbols = function
   | _ -> pick symbols
 let change_fact symbols (p, l) = p, change_one (fun s -> [change_symbol symbols s]) l
 let rec change_expression names = function
-  | Word word when is_number word -> Word (pick numbers)
+  | Word word when is_number word -> Word (pick (List.tl numbers))          (* 0 as a duration adds conditions *)
   | Word _ -> Word (pick names)
   | List [] -> List []
   | List (Word "=" :: items) -> List (Word "=" :: change_one (fun item -> [change_expression names item]) items)
@@ -157,6 +177,10 @@ let () =
   let evidence = Evidence.read original.problem.action_names (read_file Sys.argv.(2)) in
   let plan = Reader.plan original.problem (read "plan.txt") and claim = Reader.claim original.problem evidence.claim in
   let bound = match claim with Some m -> m | None -> failwith "a plan is expected" in
+  let linked { Mission.mission; steps; _ } =
+    let index = C.index_of (List.map fst steps) and orders = Derive.orders mission steps in
+    if C.check_derivations mission.C.mission_knowledge (Knowledge.levels mission.C.mission_knowledge) steps && C.can_fill mission index orders
+    then Some (C.fill mission index orders) else None in
   let accepts { Mission.mission; steps; _ } =
     C.check_mission mission (Knowledge.levels mission.C.mission_knowledge) steps (Derive.orders mission steps) evidence.ground_task
       evidence.names evidence.case evidence.goal_case evidence.argument evidence.labels_at plan claim in
@@ -164,10 +188,15 @@ let () =
   let is_plain = List.exists (fun (_, addition) -> addition <> None) original.mission.C.schemas in
   let judge steps problem_text = judged (if is_plain then read "domain.pddl" else domain_text) problem_text (List.map fst steps) in
   let names_of locals = List.map (fun local -> Knowledge.name_key (tomasys ^ local)) locals in
-  (* In a plain domain, changes of other facts could change the actions. *)
-  let is_changed (p, _) =
-    not is_plain || List.mem p (names_of ["hasValue"; "hasMinimum"; "hasMaximum"; "isMeasured"; "c_status"; "requiresC"; "fd_realisability"]) in
-  let changed = List.filter is_changed knowledge.C.stated and kept = List.filter (fun fact -> not (is_changed fact)) knowledge.C.stated in
+  (* In a plain domain, changes of these facts change the actions, and so do changes of the attributes that are estimated
+     for some design of a function. *)
+  let actions_from = names_of ["Action"; "Function"; "Requirement"; "requiresF"; "requiresQuality"; "inContext"; "isQAtype"] in
+  let concerns steps = List.sort_uniq compare (List.filter (fun (p, _) -> p = key "concerns") (List.map fst steps)) in
+  let is_judged { Mission.steps; _ } = not is_plain || concerns steps = concerns original.steps in
+  let with_facts change =
+    let is_changed (p, _) = not is_plain || not (List.mem p actions_from) in
+    let changed, kept = List.partition is_changed knowledge.C.stated in
+    { knowledge with C.stated = change changed @ kept } in
   let symbols = List.sort_uniq compare (List.concat_map snd knowledge.C.stated) in
   let failures = List.concat_map (fun (p, l) ->
     let is local = p = Knowledge.name_key (tomasys ^ local) in
@@ -175,11 +204,11 @@ let () =
     if is "Component" then [Knowledge.name_key (tomasys ^ "c_status"), l @ [text "FALSE"]]
     else if is "FunctionDesign" then [Knowledge.name_key (tomasys ^ "fd_realisability"), l @ [C.Literal (C.Boolean false)]]
     else []) knowledge.C.stated in
-  let accepted = ref 0 and rejected = ref 0 and unreadable = ref 0 in
+  let accepted = ref 0 and rejected = ref 0 and unlinked = ref 0 and unjudged = ref 0 and undecided = ref 0 and unreadable = ref 0 in
   for i = 1 to count do
     let knowledge, problem_text, false_facts = match Random.int 6 with
-      | 0 | 1 -> { knowledge with C.stated = change_one (fun _ -> []) changed @ kept }, problem_text, false
-      | 2 -> { knowledge with C.stated = change_one (fun fact -> [change_fact symbols fact]) changed @ kept }, problem_text, false
+      | 0 | 1 -> with_facts (change_one (fun _ -> [])), problem_text, false
+      | 2 -> with_facts (change_one (fun fact -> [change_fact symbols fact])), problem_text, false
       | 3 -> { knowledge with C.stated = pick failures :: knowledge.C.stated }, problem_text, false
       | 4 -> knowledge, problem_text, true
       | _ -> knowledge, change_problem problem_text, false in
@@ -187,16 +216,28 @@ let () =
     (* Other facts than those that hold: one is missing, or one more is stated. *)
     let steps = if not false_facts then right
       else if Random.bool () then change_one (fun _ -> []) right else right @ [pick failures, C.Stated] in
-    match accepts (mission knowledge steps problem_text) with
+    match mission knowledge steps problem_text with
     | exception (Rejected _ | Failure _ | Invalid_argument _ | Not_found) -> incr unreadable
-    | false -> incr rejected
-    | true ->
-      if List.sort_uniq compare (List.map fst steps) <> List.sort_uniq compare (List.map fst right) then
-        (Printf.printf "false facts are accepted (change %d)\n" i; exit 1);
-      let problem = judge right problem_text in
-      if not (is_optimal problem evidence.names plan bound) then
-        (Printf.printf "a false claim is accepted (change %d)\n" i; exit 1);
-      incr accepted
+    | changed when not (is_judged changed) -> incr unjudged
+    | changed ->
+      match linked changed with
+      | exception Rejected _ -> incr unreadable
+      | None -> incr unlinked
+      | Some problem ->
+        if List.sort_uniq compare (List.map fst steps) <> List.sort_uniq compare (List.map fst right) then
+          (Printf.printf "false facts are accepted (change %d)\n" i; exit 1);
+        let judged = judge right problem_text in
+        if not (agree problem judged) then (Printf.printf "the problem is not that of the judge (change %d)\n" i; exit 1);
+        let is_accepted = accepts changed in
+        if not is_accepted then incr rejected
+        else match is_optimal judged evidence.names plan bound with
+          | exception Too_large -> incr undecided
+          | false -> Printf.printf "a false claim is accepted (change %d)\n" i; exit 1
+          | true -> incr accepted
   done;
-  Printf.printf "%d changed missions: %d true claims accepted, %d not accepted, %d unreadable\n" count !accepted !rejected !unreadable;
-  if !accepted = 0 || !rejected = 0 then (print_endline "no claim is accepted, or all are"; exit 1)
+  Printf.printf "%d changed missions: %d with the judge's problem, for which %d true claims and no false claim are accepted" count
+    (!accepted + !rejected + !undecided) !accepted;
+  Printf.printf "; %d without a problem, %d not judged" !unlinked (!unjudged + !unreadable);
+  if !undecided > 0 then Printf.printf "; %d accepted claims not decided" !undecided;
+  print_newline ();
+  if !accepted + !undecided = 0 || !rejected = 0 then (print_endline "no claim is accepted, or all are"; exit 1)
