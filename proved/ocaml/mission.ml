@@ -82,7 +82,7 @@ let query text =
 type t = { mission : C.mission; problem : Reader.problem; steps : (C.data * C.reason) list; other_metric : bool }
 
 (* The mission of a knowledge base with derivations of its facts. [derive] adds the derivations of the facts of given
-   rules; it is not believed, and neither are [steps]: the theorem holds for any. *)
+   rules. Neither [derive] nor [steps] are believed: if [check_mission] accepts, exactly these facts hold. *)
 let read ~derive knowledge steps origin problem_text =
   let text name = string (field origin name) in
   let sections text = match expressions text with
@@ -91,9 +91,6 @@ let read ~derive knowledge steps origin problem_text =
     | _ -> reject "(define ...) is expected" in
   let all name sections = List.concat_map (fun (other, items) -> if other = name then items else []) sections in
   let domain = sections (text "domain") and own = sections (text "problem") and certified = sections problem_text in
-  (* The knowledge base has further objects, and the user may choose another metric. *)
-  let other_objects = List.map fst (typed (all ":objects" certified)) and metric = all ":metric" certified in
-  let problem = Reader.problem ~metric ~other_objects (text "domain") (text "problem") in
 
   (* Individuals *)
   let pairs name = match optional origin name with
@@ -110,6 +107,14 @@ let read ~derive knowledge steps origin problem_text =
     | Some iri when is_pddl_name (called iri) -> object_key (called iri)
     | Some iri -> reject "not covered: <%s>, whose name is not a PDDL name" iri
     | None -> reject "not covered: an individual without a name" in
+
+  (* Objects of the certificate that are individuals can occur in the files. The user may choose another metric. *)
+  let is_called = Hashtbl.create 500 in
+  List.iter (fun (iri, _) -> Hashtbl.replace is_called (called iri) ()) names;
+  let is_individual name = Hashtbl.mem is_called name && not (is_number name) in
+  let other_objects = List.filter is_individual (List.map fst (typed (all ":objects" certified))) in
+  let metric = all ":metric" certified in
+  let problem = Reader.problem ~metric ~other_objects (text "domain") (text "problem") in
 
   (* The facts of a class or property of TOMASys. Attribute types have different names. *)
   let facts_of term = List.filter_map (fun ((p, l), _) ->
