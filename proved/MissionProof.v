@@ -1,6 +1,6 @@
 (* Checks a mission: the derivations of its facts, and the certificate for the problem that is filled with them.
    Theorem [mission_optimal]: what [check_mission] accepts is true. *)
-From Coq Require Import ZArith QArith List Bool FMapPositive.
+From Coq Require Import ZArith QArith List Bool FMapPositive Permutation.
 From Proved Require Import Task Check Lifted Faithful Symbolic Axioms Optimal TimelineProof Datalog Derivations Mission.
 Import ListNotations.
 Open Scope nat_scope.
@@ -230,4 +230,31 @@ Proof.
   - exact Co.
   - apply fill_ok, F.
   - exact (optimal _ _ _ _ _ _ _ _ _ C).
+Qed.
+
+(* The facts determine the problem, except for the order of objects, and for the order of the parameters for designs. *)
+Definition same_action (schema : action * option choice_of_designs) (a b : action) : Prop :=
+  a = b \/ exists c functions others, snd schema = Some c /\ Permutation functions others /\
+    a = with_designs c functions (fst schema) /\ b = with_designs c others (fst schema).
+Theorem filled_determined : forall W M P Q, filled W M P -> filled W M Q ->
+  (forall t o, In o (objects P t) <-> In o (objects Q t)) /\
+  (forall a, holds_in (initial P) a = holds_in (initial Q) a) /\ (forall f, value_in (initial P) f = value_in (initial Q) f) /\
+  (exists schemas, Forall2 (fun s ab => same_action s (fst ab) (snd ab)) schemas (combine (actions P) (actions Q)) /\
+     length (actions P) = length (actions Q)) /\
+  strata P = strata Q /\ goal_formula P = goal_formula Q /\
+  metric P = metric Q /\ per_time P = per_time Q /\ per_step P = per_step Q.
+Proof.
+  intros W M P Q [_ [O [H [V [A [S [G [Me [T N]]]]]]]]] [_ [O' [H' [V' [A' [S' [G' [Me' [T' N']]]]]]]]]. parts; try congruence.
+  - intros t o. rewrite O, O'. reflexivity.
+  - intros [p l]. apply eq_true_iff_eq. rewrite H, H'. reflexivity.
+  - intros [f l]. destruct (value_in (initial P) (f, l)) as [q|] eqn:E.
+    + symmetry. apply V', V, E.
+    + destruct (value_in (initial Q) (f, l)) as [q|] eqn:E'; [|reflexivity]. apply V', V in E'. congruence.
+  - exists (schemas W). revert A A'. generalize (schemas W) (actions P) (actions Q). clear.
+    intros ss. induction ss as [|s ss IH]; intros l m A A'; inversion A; inversion A'; subst; cbn.
+    + split; [constructor|reflexivity].
+    + destruct (IH _ _ H3 H8) as [F L]. split; [|f_equal; exact L]. constructor; [|exact F]. cbn [fst snd].
+      unfold action_of in *. destruct (snd s) as [c|] eqn:E; [|left; congruence].
+      destruct H1 as [fs [D [I ->]]], H6 as [gs [D' [I' ->]]]. right. exists c, fs, gs. parts; try reflexivity; [exact E|].
+      apply NoDup_Permutation; try assumption. intro f. rewrite I, I'. reflexivity.
 Qed.

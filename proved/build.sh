@@ -5,7 +5,7 @@
 set -e
 cd "$(dirname "$0")"
 for file in Task Check Proof Sound Derived Lifted Faithful Symbolic Axioms Simulation Optimal Lists Fronts Timed Timeline TimelineProof Datalog Derivations Mission MissionProof Extract; do coqc -Q . Proved "$file.v" >/dev/null; done
-for theorem in Sound.sound Derived.derive_closed Axioms.stratum_closed Optimal.optimal Optimal.unsolvable Lists.list_optimal Fronts.front_optimal Fronts.front_undominated TimelineProof.timed_optimal Derivations.knowledge MissionProof.mission_optimal; do
+for theorem in Sound.sound Derived.derive_closed Axioms.stratum_closed Optimal.optimal Optimal.unsolvable Lists.list_optimal Fronts.front_optimal Fronts.front_undominated TimelineProof.timed_optimal Derivations.knowledge MissionProof.mission_optimal MissionProof.filled_determined; do
   answer=$(printf 'From Proved Require %s.\nPrint Assumptions %s.\n' "${theorem%.*}" "$theorem" | coqtop -q -Q . Proved 2>/dev/null)
   echo "$answer" | grep -q 'Closed under the global context' || { echo "$theorem rests on assumptions: $answer"; exit 1; }
   echo "$theorem: closed under the global context"

@@ -364,6 +364,9 @@ unlinked origin.json 's/"bindings":{}/"bindings":{"functiondesign":"class:Compon
   'rejected: not covered: battery_usage is a function of functiondesign, and an attribute'
 unlinked origin.json 's/"bindings":{}/"bindings":{"battery_usage":"cost"}/' 'rejected: not covered: the binding cost'
 unlinked origin.json 's/(robot_at wp1)/(robot_at wp1) (fd_available fd_aruco)/' 'rejected: not covered: fd_available in the problem file'
+unlinked origin.json 's/(over all (fd_available ?fd))/(over all (inferred-available ?fd))/' \
+  'rejected: not covered, or unknown as a predicate: inferred-available'
+unlinked origin.json 's/(robot_at wp1)/(robot_at wp1) (at 5 (robot_at wp2))/' 'rejected: not covered: timed initial literals'
 # Two individuals are one object, or an individual has a name that PDDL does not have.
 names() { printf 's|"changes"|"names":{"http://metacontrol.org/metaplan/ugv#%s":"%s"},"changes"|' "$1" "$2"; }
 unlinked origin.json "$(names fd_aruco fd_amcl_kinect)" 'not proved'

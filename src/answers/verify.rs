@@ -29,12 +29,10 @@ struct TheoremPart<'a> {
     parts: &'a [&'static str],
     /// The proved statement, or the reason why nothing is proved.
     message: &'a str,
-    /// If a theorem covers the claim, and the certificate has a knowledge base: whether theorem `knowledge` of
-    /// `proved/Derivations.v` covers its derivations.
+    /// If a theorem covers the claim, and the certificate has a knowledge base: whether theorem `knowledge` of `proved/Derivations.v` covers its derivations.
     #[serde(skip_serializing_if = "Option::is_none")]
     derivations: Option<TheoremAnswer<'a>>,
-    /// If a theorem covers the claim, and the certificate has a knowledge base: whether theorem `mission_optimal` of
-    /// `proved/MissionProof.v` covers the problem that follows from it.
+    /// If a theorem covers the claim, and the certificate has a knowledge base: whether theorem `mission_optimal` of `proved/MissionProof.v` covers the problem that follows from it.
     #[serde(skip_serializing_if = "Option::is_none")]
     knowledge: Option<TheoremAnswer<'a>>,
 }
