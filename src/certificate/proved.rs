@@ -168,10 +168,10 @@ impl ProvedChecker {
                     }
                     _ => {
                         let verified = report.parts.iter().find(|part| part.part == FROM_KNOWLEDGE);
-                        let is_verified = verified.map(|part| part.result.is_ok());
-                        let mission = is_verified
-                            .map(|is_verified| self.mission(directory, claim, is_verified, folder.path(), stop))
-                            .transpose()?;
+                        let mission = |part: &VerifiedPart| {
+                            self.mission(directory, claim, part.result.is_ok(), folder.path(), stop)
+                        };
+                        let mission = verified.map(mission).transpose()?;
                         return Ok(Theorem::Holds { name, statement, parts, derivations, mission });
                     }
                 }
