@@ -373,9 +373,12 @@ unlinked origin.json "$(names fd_aruco fd_amcl_kinect)" 'not proved'
 unlinked origin.json "$(names fd_aruco 'an aruco')" \
   'rejected: not covered: <http://metacontrol.org/metaplan/ugv#fd_aruco>, whose name is not a PDDL name'
 unlinked origin.json "$(names fd_amcl_kinect fd_other)" 'rejected: unknown object: fd_amcl_kinect'
-unlinked origin.json "$(names fd_none fd_other)" 'rejected: not covered: no individual <http://metacontrol.org/metaplan/ugv#fd_none>'
+unlinked origin.json "$(names fd_none fd_other)" \
+  'rejected: not covered: <http://metacontrol.org/metaplan/ugv#fd_none>, which is not the name of one individual'
 # An individual may have another name if neither the plan nor its evidence has it.
 unlinked origin.json "$(names c_camera camera)" \
+  'proved: for the problem that follows from the knowledge base: the plan of 4 steps is optimal, metric 408'
+unlinked origin.json 's/"changes"/"names":{"c_camera":"camera"},&/' \
   'proved: for the problem that follows from the knowledge base: the plan of 4 steps is optimal, metric 408'
 unlinked problem.pddl 's/(\* 100 (total-time))/(* 99 (total-time))/' 'not proved'
 echo 'test.sh: all as expected'

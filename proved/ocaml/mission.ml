@@ -97,9 +97,11 @@ let read ~derive knowledge steps origin problem_text =
     | None -> []
     | Some (Object fields) -> List.map (fun (name, value) -> name, string value) fields
     | Some _ -> reject "origin.json: names are expected" in
-  let renamed = pairs "names" in
   let names = all_names () in
-  List.iter (fun (iri, _) -> if not (List.mem_assoc iri names) then reject "not covered: no individual <%s>" iri) renamed;
+  let renamed = List.map (fun (name, object_name) ->
+    match List.filter (fun (iri, _) -> iri = name || local_name iri = name) names with
+    | [iri, _] -> iri, object_name
+    | _ -> reject "not covered: <%s>, which is not the name of one individual" name) (pairs "names") in
   let called iri = String.lowercase_ascii (match List.assoc_opt iri renamed with Some name -> name | None -> local_name iri) in
   let iri_of = Hashtbl.create 500 in
   List.iter (fun (iri, key) -> Hashtbl.replace iri_of key iri) names;
