@@ -1,8 +1,8 @@
 (* Semantics of a mission: the PDDL problem that PDDL files and a knowledge base determine. The bindings of the mission
    are rules of the knowledge base; their conclusions are facts about PDDL symbols: members of types, atoms of
    predicates, values of functions. In a plain domain, the facts also determine which designs an action chooses.
-   This file, the theorem [mission_optimal] in MissionProof.v and the readers are all that has to be believed about
-   missions, in addition to Lifted.v and Datalog.v. *)
+   This file, the theorems [mission_optimal] and [mission_front] in MissionProof.v and the readers are all that has to be
+   believed about missions, in addition to Lifted.v and Datalog.v, and to Lists.v and Fronts.v for Pareto fronts. *)
 From Coq Require Import ZArith QArith List Bool.
 From Proved Require Import Lifted Datalog.
 Import ListNotations.
@@ -86,8 +86,8 @@ Definition filled (P : problem) : Prop :=
   metric P = metric (files W) /\ per_time P = per_time (files W) /\ per_step P = per_step (files W).
 End Filled.
 
-(* The claim is optimal for the problem that follows from the mission's knowledge base and PDDL files. The knowledge base
-   has exactly one stable model, and it is consistent. *)
-Definition mission_is_optimal (W : mission) (plan : list (nat * list key)) (claim : option Q) : Prop :=
+(* The claim holds for the problem that follows from the mission's knowledge base and PDDL files. The knowledge base has
+   exactly one stable model, and it is consistent. *)
+Definition holds_for_mission (W : mission) (claim : problem -> Prop) : Prop :=
   exists M P, stable (mission_knowledge W) M /\ (forall other, stable (mission_knowledge W) other -> forall f, other f <-> M f) /\
-    consistent (mission_knowledge W) M /\ filled W M P /\ is_optimal P plan claim.
+    consistent (mission_knowledge W) M /\ filled W M P /\ claim P.

@@ -1,7 +1,7 @@
 (* Checks a mission: the derivations of its facts, and the certificate for the problem that is filled with them.
-   Theorem [mission_optimal]: what [check_mission] accepts is true. *)
+   Theorems [mission_optimal] and [mission_front]: what [check_mission] and [check_mission_front] accept is true. *)
 From Coq Require Import ZArith QArith List Bool FMapPositive Permutation.
-From Proved Require Import Task Check Lifted Faithful Symbolic Axioms Optimal TimelineProof Datalog Derivations Mission.
+From Proved Require Import Task Check Lifted Faithful Symbolic Axioms Optimal Lists Fronts TimelineProof Datalog Derivations Mission.
 Import ListNotations.
 Open Scope nat_scope.
 
@@ -59,12 +59,18 @@ Definition can_fill (orders : list (list key)) : bool :=
   forallb order_accepted (combine (schemas W) orders).
 End Fill.
 
+(* The facts follow from the knowledge base, and the problem that is filled with them passes a check. *)
+Definition check_filled (W : mission) (level : key -> nat) (steps : list (data * reason)) (orders : list (list key))
+    (check : problem -> bool) : bool :=
+  let I := index_of (map fst steps) in
+  check_derivations (mission_knowledge W) level steps && can_fill W I orders && check (fill W I orders).
 Definition check_mission (W : mission) (level : key -> nat) (steps : list (data * reason)) (orders : list (list key))
     (T : task) (N : names) (case : nat -> list key -> case_tree) (goal_case : case_tree)
     (A : Check.argument) (oracle : state -> list positive) (plan : list (nat * list key)) (claim : option Q) : bool :=
-  let I := index_of (map fst steps) in
-  check_derivations (mission_knowledge W) level steps && can_fill W I orders &&
-  check_certificate (fill W I orders) T N case goal_case A oracle plan claim.
+  check_filled W level steps orders (fun P => check_certificate P T N case goal_case A oracle plan claim).
+Definition check_mission_front (W : mission) (level : key -> nat) (steps : list (data * reason)) (orders : list (list key))
+    (first second : objective) (es : list evidence) (points : list point) : bool :=
+  check_filled W level steps orders (fun P => check_front P first second es points).
 
 (* The proof *)
 Lemma split_row_ok : forall l names q, split_row l = Some (names, q) <->
@@ -219,17 +225,33 @@ Proof.
 Qed.
 End Filled.
 
-Theorem mission_optimal : forall W level steps orders T N case goal_case A oracle plan claim,
-  check_mission W level steps orders T N case goal_case A oracle plan claim = true -> mission_is_optimal W plan claim.
+Lemma check_filled_ok : forall W level steps orders check (claim : problem -> Prop), (forall P, check P = true -> claim P) ->
+  check_filled W level steps orders check = true -> holds_for_mission W claim.
 Proof.
-  intros W level steps orders T N case goal_case A oracle plan claim H. unfold check_mission in H.
+  intros W level steps orders check claim Ok H. unfold check_filled in H. cbv zeta in H.
   rewrite !andb_true_iff in H. destruct H as [[D F] C]. apply knowledge in D. destruct D as [S [Co U]].
   exists (fun f => In f (map fst steps)), (fill W (index_of (map fst steps)) orders). parts.
   - exact S.
   - exact U.
   - exact Co.
   - apply fill_ok, F.
-  - exact (optimal _ _ _ _ _ _ _ _ _ C).
+  - apply Ok, C.
+Qed.
+
+Theorem mission_optimal : forall W level steps orders T N case goal_case A oracle plan claim,
+  check_mission W level steps orders T N case goal_case A oracle plan claim = true ->
+  holds_for_mission W (fun P => is_optimal P plan claim).
+Proof.
+  intros W level steps orders T N case goal_case A oracle plan claim. apply check_filled_ok. intros P H.
+  exact (optimal _ _ _ _ _ _ _ _ _ H).
+Qed.
+
+Theorem mission_front : forall W level steps orders first second es points,
+  check_mission_front W level steps orders first second es points = true ->
+  holds_for_mission W (fun P => is_front P first second points).
+Proof.
+  intros W level steps orders first second es points. apply check_filled_ok. intros P H.
+  exact (front_optimal _ _ _ _ _ H).
 Qed.
 
 (* The facts determine the problem, except for the order of objects, and for the order of the parameters for designs. *)

@@ -381,4 +381,17 @@ unlinked origin.json "$(names c_camera camera)" \
 unlinked origin.json 's/"changes"/"names":{"c_camera":"camera"},&/' \
   'proved: for the problem that follows from the knowledge base: the plan of 4 steps is optimal, metric 408'
 unlinked problem.pddl 's/(\* 100 (total-time))/(* 99 (total-time))/' 'not proved'
+# A front of a mission: theorem [mission_front]
+cp -r tests/ugv_front "$temporary/ugv_front"
+cp tests/ugv/knowledge.nt tests/ugv/derivations.json "$temporary/ugv_front"
+for i in 1 2; do ocaml/metaplan-proved-prepare "tests/ugv_front/$i" >"$temporary/$i" || fail "no evidence for tests/ugv_front/$i"; done
+mission_front() {
+  answer=$(ocaml/metaplan-proved-mission "$temporary/ugv_front" $(evidence "$2")) || true
+  [ "$answer" = "$1" ] || fail "ugv_front: $answer, where the answer should be: $1"
+}
+mission_front 'proved: for the problem that follows from the knowledge base: the front has exactly these values: 4 8' '1 2'
+for order in 1 2 '2 1' '1 1' '1 2 2'; do mission_front 'not proved' "$order"; done
+sed 's/(= (battery) 100)/(= (battery) 7)/' tests/ugv_front/origin.json >"$temporary/ugv_front/origin.json"
+mission_front 'not proved' '1 2'
+echo 'tests/ugv_front: the front of a mission is accepted'
 echo 'test.sh: all as expected'

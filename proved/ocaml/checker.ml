@@ -5773,15 +5773,29 @@ let can_fill w i orders =
       (Nat.eqb (length orders) (length w.schemas)))
     (forallb (order_accepted w i) (combine w.schemas orders))
 
+(** val check_filled :
+    mission -> (key1 -> nat) -> (data * reason) list -> key1 list list ->
+    (problem -> bool) -> bool **)
+
+let check_filled w level0 steps orders check0 =
+  let i = index_of (map fst steps) in
+  (&&)
+    ((&&) (check_derivations w.mission_knowledge level0 steps)
+      (can_fill w i orders)) (check0 (fill w i orders))
+
 (** val check_mission :
     mission -> (key1 -> nat) -> (data * reason) list -> key1 list list ->
     task -> names -> (nat -> key1 list -> case_tree) -> case_tree -> argument
     -> (state -> positive list) -> (nat * key1 list) list -> q option -> bool **)
 
 let check_mission w level0 steps orders t0 n case goal_case a oracle plan claim =
-  let i = index_of (map fst steps) in
-  (&&)
-    ((&&) (check_derivations w.mission_knowledge level0 steps)
-      (can_fill w i orders))
-    (check_certificate (fill w i orders) t0 n case goal_case a oracle plan
-      claim)
+  check_filled w level0 steps orders (fun p ->
+    check_certificate p t0 n case goal_case a oracle plan claim)
+
+(** val check_mission_front :
+    mission -> (key1 -> nat) -> (data * reason) list -> key1 list list ->
+    objective -> objective -> evidence list -> point list -> bool **)
+
+let check_mission_front w level0 steps orders first second es points =
+  check_filled w level0 steps orders (fun p ->
+    check_front p first second es points)

@@ -1504,7 +1504,15 @@ val named_apart : mission -> index -> bool
 
 val can_fill : mission -> index -> key1 list list -> bool
 
+val check_filled :
+  mission -> (key1 -> nat) -> (data * reason) list -> key1 list list ->
+  (problem -> bool) -> bool
+
 val check_mission :
   mission -> (key1 -> nat) -> (data * reason) list -> key1 list list -> task
   -> names -> (nat -> key1 list -> case_tree) -> case_tree -> argument ->
   (state -> positive list) -> (nat * key1 list) list -> q option -> bool
+
+val check_mission_front :
+  mission -> (key1 -> nat) -> (data * reason) list -> key1 list list ->
+  objective -> objective -> evidence list -> point list -> bool

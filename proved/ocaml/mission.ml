@@ -82,8 +82,9 @@ let query text =
 type t = { mission : C.mission; problem : Reader.problem; steps : (C.data * C.reason) list; other_metric : bool }
 
 (* The mission of a knowledge base with derivations of its facts. [derive] adds the derivations of the facts of given
-   rules. Neither [derive] nor [steps] are believed: if [check_mission] accepts, exactly these facts hold. *)
-let read ~derive knowledge steps origin problem_text =
+   rules. Neither [derive] nor [steps] are believed: if [check_mission] accepts, exactly these facts hold. [metric]
+   replaces that of the certificate. *)
+let read ~derive ?metric knowledge steps origin problem_text =
   let text name = string (field origin name) in
   let sections text = match expressions text with
     | [List (_ :: _ :: sections)] ->
@@ -115,7 +116,7 @@ let read ~derive knowledge steps origin problem_text =
   List.iter (fun (iri, _) -> Hashtbl.replace is_called (called iri) ()) names;
   let is_individual name = Hashtbl.mem is_called name && not (is_number name) in
   let other_objects = List.filter is_individual (List.map fst (typed (all ":objects" certified))) in
-  let metric = all ":metric" certified in
+  let metric = Option.value metric ~default:(all ":metric" certified) in
   let problem = Reader.problem ~metric ~other_objects (text "domain") (text "problem") in
 
   (* The facts of a class or property of TOMASys. Attribute types have different names. *)

@@ -6,7 +6,8 @@
 //! (theorems `optimal` and `unsolvable`, or `timed_optimal` if there are timed initial literals), and
 //! `metaplan-proved-front` for a Pareto front (theorem `front_optimal`). If the certificate has a knowledge base,
 //! `metaplan-proved-knowledge` checks the derivations of its facts (theorem `knowledge`), and `metaplan-proved-mission`
-//! checks the claim for the problem that follows from them (theorem `mission_optimal`).
+//! checks the claim for the problem that follows from them (theorems `mission_optimal`
+//! and `mission_front`).
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -72,8 +73,8 @@ pub enum Theorem {
         /// For a certificate with a knowledge base: the statement of theorem `knowledge` about the derivations, or the
         /// reason why the theorem does not apply.
         derivations: Option<Result<String, String>>,
-        /// For a certificate with a knowledge base: the statement of theorem `mission_optimal` about the problem that
-        /// follows from it, or the reason why the theorem does not apply.
+        /// For a certificate with a knowledge base: the statement of theorem `mission_optimal` or `mission_front` about
+        /// the problem that follows from it, or the reason why the theorem does not apply.
         mission: Option<Result<String, String>>,
     },
     /// It is not shown that the claim follows from the theorem, for the given reason: for example, the proved checker
@@ -216,14 +217,15 @@ impl ProvedChecker {
         folder: &Path,
         stop: &dyn Fn() -> bool,
     ) -> Result<Result<String, String>, Message> {
-        if matches!(claim, Claim::Front(_)) {
-            return Ok(Err("theorem `mission_optimal` does not cover Pareto fronts".to_owned()));
-        }
         if !self.mission.is_file() {
             return Ok(Err(format!("the program `{MISSION}` is missing")));
         }
         let mut check = Command::new(&self.mission);
-        check.arg(directory).arg(evidence_file(folder, 0));
+        let last = match claim {
+            Claim::Front(front) => front.points.len(),
+            Claim::Optimal { .. } | Claim::Unsolvable => 0,
+        };
+        check.arg(directory).args((0..=last).map(|position| evidence_file(folder, position)));
         let (output, errors) = (folder.join("mission"), folder.join("errors"));
         Ok(match checked(check, MISSION, &output, &errors, stop)? {
             Answer::Accepted(statement) if !states_for_mission(&statement, claim) => {

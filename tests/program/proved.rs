@@ -98,6 +98,18 @@ fn theorem_covers_missions_with_explicit_and_plain_domains() {
     let answer = verify(&[&certificate, "--proved", "--format", "json"]).json();
     let message = answer["theorem"]["knowledge"]["message"].as_str().unwrap_or_default();
     assert!(message.contains("with another metric than the mission's"), "{answer:#}");
+    let folder = tempfile::tempdir().expect("a folder");
+    let front = folder.path().join("front").display().to_string();
+    let objectives = "total-time,battery_used";
+    let outcome = metaplan_in(
+        &root(),
+        &["plan", "missions/ugv.toml", "--pareto", objectives, "--certificate", &front],
+        "",
+    );
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let outcome = verify(&[&front, "--proved"]);
+    let line = "\nproved: theorem `mission_front` covers the part knowledge\n";
+    assert!(outcome.status == 0 && outcome.stdout.contains(line), "{outcome:#?}");
 }
 
 /// A program that accepts all derivations.
