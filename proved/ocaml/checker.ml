@@ -715,6 +715,12 @@ let rec seq start = function
 | O -> []
 | S len0 -> start :: (seq (S start) len0)
 
+(** val repeat : 'a1 -> nat -> 'a1 list **)
+
+let rec repeat x = function
+| O -> []
+| S k -> x :: (repeat x k)
+
 type q = { qnum : z; qden : positive }
 
 (** val inject_Z : z -> q **)
@@ -5508,3 +5514,288 @@ let check_derivations k level0 steps =
         (forallb (contains i) k.stated))
       (founded k i (index_of k.stated) M.empty XH steps))
     (forallb (complete_for i) k.implications)
+
+(** val in_expression :
+    (term -> term) -> (key1 -> expression option) -> expression -> expression **)
+
+let rec in_expression t0 sum e = match e with
+| Fluent (f, ts) ->
+  (match ts with
+   | [] -> (match sum f with
+            | Some e0 -> e0
+            | None -> e)
+   | _ :: _ -> Fluent (f, (map t0 ts)))
+| Plus (a, b) -> Plus ((in_expression t0 sum a), (in_expression t0 sum b))
+| Minus (a, b) -> Minus ((in_expression t0 sum a), (in_expression t0 sum b))
+| Times (a, b) -> Times ((in_expression t0 sum a), (in_expression t0 sum b))
+| Over (a, b) -> Over ((in_expression t0 sum a), (in_expression t0 sum b))
+| _ -> e
+
+(** val in_formula :
+    (term -> term) -> (key1 -> expression option) -> formula -> formula **)
+
+let rec in_formula t0 sum f = match f with
+| Truth _ -> f
+| Atom (p, ts) -> Atom (p, (map t0 ts))
+| Same (a, b) -> Same ((t0 a), (t0 b))
+| Compare (strict, a, b) ->
+  Compare (strict, (in_expression t0 sum a), (in_expression t0 sum b))
+| Not g -> Not (in_formula t0 sum g)
+| And (g, h) -> And ((in_formula t0 sum g), (in_formula t0 sum h))
+| Forall (type0, g) -> Forall (type0, (in_formula t0 sum g))
+
+(** val in_effect :
+    (term -> term) -> (key1 -> expression option) -> effect -> effect **)
+
+let rec in_effect t0 sum e = match e with
+| Nothing -> e
+| Put (b, p, ts) -> Put (b, p, (map t0 ts))
+| Change (b, f, ts, x) -> Change (b, f, (map t0 ts), (in_expression t0 sum x))
+| Both (a, b) -> Both ((in_effect t0 sum a), (in_effect t0 sum b))
+| When (f, a) -> When ((in_formula t0 sum f), (in_effect t0 sum a))
+| Each (type0, a) -> Each (type0, (in_effect t0 sum a))
+
+type choice_of_designs = { requirement : key1; design_type : key1;
+                           solves : key1; available : key1;
+                           sums : (key1 * key1) list;
+                           ruled_out : (formula * key1) list }
+
+(** val with_designs : choice_of_designs -> key1 list -> action -> action **)
+
+let with_designs c functions a =
+  let n = length a.parameters in
+  let k = length functions in
+  let t0 = fun x ->
+    match x with
+    | Var i -> Var (if Nat.ltb i n then i else add i k)
+    | Object o -> Object o
+  in
+  let designs =
+    combine (map (fun x -> Var x) (seq n k))
+      (map (fun x -> Object x) functions)
+  in
+  let sum = fun f ->
+    match find (fun s -> Coq_Pos.eqb f (fst s)) c.sums with
+    | Some p ->
+      let (_, g) = p in
+      Some
+      (fold_right (fun x x0 -> Plus (x, x0)) (Constant { qnum = Z0; qden =
+        XH })
+        (map (fun d -> Fluent (g, ((fst d) :: ((snd d) :: [])))) designs))
+    | None -> None
+  in
+  let all = fold_right (fun x x0 -> And (x, x0)) (Truth true) in
+  let chosen =
+    all (map (fun d -> Atom (c.solves, ((fst d) :: ((snd d) :: [])))) designs)
+  in
+  let lasting =
+    all
+      (map (fun d -> And ((Atom (c.available, ((fst d) :: []))),
+        (all
+          (map (fun r ->
+            imply (fst r) (Not (Atom ((snd r), ((fst d) :: ((snd d) :: []))))))
+            c.ruled_out)))) designs)
+  in
+  { parameters = (app a.parameters (repeat c.design_type k)); duration =
+  (option_map (in_expression t0 sum) a.duration); at_start = (And
+  ((in_formula t0 sum a.at_start), (And (chosen, lasting)))); start_effect =
+  (in_effect t0 sum a.start_effect); over_all = (And
+  ((in_formula t0 sum a.over_all), lasting)); at_end =
+  (in_formula t0 sum a.at_end); end_effect = (in_effect t0 sum a.end_effect) }
+
+type mission = { mission_knowledge : knowledge_base; files : problem;
+                 schemas : (action * choice_of_designs option) list;
+                 bound_symbols : key1 list; object_for : (key1 -> key1) }
+
+(** val split_row : symbol list -> (key1 list * q option) option **)
+
+let rec split_row = function
+| [] -> Some ([], None)
+| s :: l0 ->
+  (match s with
+   | Name n ->
+     (match split_row l0 with
+      | Some p -> let (names0, q0) = p in Some ((n :: names0), q0)
+      | None -> None)
+   | Literal x ->
+     (match x with
+      | Numeric q0 ->
+        (match l0 with
+         | [] -> Some ([], (Some q0))
+         | _ :: _ -> None)
+      | _ -> None))
+
+(** val names_in : symbol list -> key1 list **)
+
+let names_in l =
+  flat_map (fun s -> match s with
+                     | Name n -> n :: []
+                     | Literal _ -> []) l
+
+(** val atom_rows : mission -> index -> key1 -> key1 list list **)
+
+let atom_rows w i p =
+  flat_map (fun l ->
+    match split_row l with
+    | Some p0 ->
+      let (names0, o) = p0 in
+      (match o with
+       | Some _ -> []
+       | None -> (map w.object_for names0) :: [])
+    | None -> []) (rows i p)
+
+(** val value_rows : mission -> index -> key1 -> (key1 list * q) list **)
+
+let value_rows w i p =
+  flat_map (fun l ->
+    match split_row l with
+    | Some p0 ->
+      let (names0, o) = p0 in
+      (match o with
+       | Some q0 -> ((map w.object_for names0), q0) :: []
+       | None -> [])
+    | None -> []) (rows i p)
+
+(** val bound_atoms : mission -> index -> atom list **)
+
+let bound_atoms w i =
+  flat_map (fun p -> map (fun x -> (p, x)) (atom_rows w i p)) w.bound_symbols
+
+(** val bound_values : mission -> index -> (atom * q) list **)
+
+let bound_values w i =
+  filter (fun v ->
+    match find_atom w.files.initial_values (fst v) with
+    | Some _ -> false
+    | None -> true)
+    (flat_map (fun p ->
+      map (fun r -> ((p, (fst r)), (snd r))) (value_rows w i p))
+      w.bound_symbols)
+
+(** val filled_objects : mission -> index -> key1 -> key1 list **)
+
+let filled_objects w i t0 =
+  app (w.files.objects t0)
+    (if member t0 w.bound_symbols
+     then flat_map (fun l ->
+            match l with
+            | [] -> []
+            | o :: l0 -> (match l0 with
+                          | [] -> o :: []
+                          | _ :: _ -> [])) (atom_rows w i t0)
+     else [])
+
+(** val filled_action :
+    (action * choice_of_designs option) -> key1 list -> action **)
+
+let filled_action schema functions =
+  match snd schema with
+  | Some c -> with_designs c functions (fst schema)
+  | None -> fst schema
+
+(** val filled_values : mission -> index -> q atom_map **)
+
+let filled_values w i =
+  fold_left (fun m v -> add_atom (fst v) (snd v) m) (bound_values w i)
+    w.files.initial_values
+
+(** val fill : mission -> index -> key1 list list -> problem **)
+
+let fill w i orders =
+  { objects = (filled_objects w i); actions =
+    (map (fun s -> filled_action (fst s) (snd s)) (combine w.schemas orders));
+    strata = w.files.strata; initial_atoms =
+    (fold_left (fun m a -> add_atom a () m) (bound_atoms w i)
+      w.files.initial_atoms); initial_values = (filled_values w i);
+    goal_formula = w.files.goal_formula; metric = w.files.metric; per_time =
+    w.files.per_time; per_step = w.files.per_step }
+
+(** val required_objects :
+    mission -> index -> choice_of_designs -> key1 list **)
+
+let required_objects w i c =
+  if member c.requirement w.bound_symbols
+  then flat_map (fun l ->
+         match l with
+         | [] -> []
+         | o :: l0 -> (match l0 with
+                       | [] -> o :: []
+                       | _ :: _ -> [])) (atom_rows w i c.requirement)
+  else []
+
+(** val order_accepted :
+    mission -> index -> ((action * choice_of_designs option) * key1 list) ->
+    bool **)
+
+let order_accepted w i s =
+  match snd (fst s) with
+  | Some c ->
+    (&&)
+      ((&&) (distinct0 (snd s))
+        (forallb (fun f -> member f (required_objects w i c)) (snd s)))
+      (forallb (fun f -> member f (snd s)) (required_objects w i c))
+  | None -> true
+
+(** val exact_eqb : q -> q -> bool **)
+
+let exact_eqb p q0 =
+  (&&) (Z.eqb p.qnum q0.qnum) (Coq_Pos.eqb p.qden q0.qden)
+
+(** val has_value0 : q atom_map -> (atom * q) -> bool **)
+
+let has_value0 values v =
+  match find_atom values (fst v) with
+  | Some q0 -> exact_eqb q0 (snd v)
+  | None -> false
+
+(** val mentioned : mission -> index -> key1 list **)
+
+let mentioned w i =
+  flat_map (fun p -> flat_map names_in (rows i p)) w.bound_symbols
+
+(** val named_apart : mission -> index -> bool **)
+
+let named_apart w i =
+  let names0 = nodup Coq_Pos.eq_dec (mentioned w i) in
+  forallb (fun n ->
+    forallb (fun m ->
+      (||) (negb (Coq_Pos.eqb (w.object_for n) (w.object_for m)))
+        (Coq_Pos.eqb n m)) names0) names0
+
+(** val can_fill : mission -> index -> key1 list list -> bool **)
+
+let can_fill w i orders =
+  (&&)
+    ((&&)
+      ((&&) (named_apart w i)
+        (let values = filled_values w i in
+         forallb (has_value0 values) (bound_values w i)))
+      (Nat.eqb (length orders) (length w.schemas)))
+    (forallb (order_accepted w i) (combine w.schemas orders))
+
+(** val check_filled :
+    mission -> (key1 -> nat) -> (data * reason) list -> key1 list list ->
+    (problem -> bool) -> bool **)
+
+let check_filled w level0 steps orders check0 =
+  let i = index_of (map fst steps) in
+  (&&)
+    ((&&) (check_derivations w.mission_knowledge level0 steps)
+      (can_fill w i orders)) (check0 (fill w i orders))
+
+(** val check_mission :
+    mission -> (key1 -> nat) -> (data * reason) list -> key1 list list ->
+    task -> names -> (nat -> key1 list -> case_tree) -> case_tree -> argument
+    -> (state -> positive list) -> (nat * key1 list) list -> q option -> bool **)
+
+let check_mission w level0 steps orders t0 n case goal_case a oracle plan claim =
+  check_filled w level0 steps orders (fun p ->
+    check_certificate p t0 n case goal_case a oracle plan claim)
+
+(** val check_mission_front :
+    mission -> (key1 -> nat) -> (data * reason) list -> key1 list list ->
+    objective -> objective -> evidence list -> point list -> bool **)
+
+let check_mission_front w level0 steps orders first second es points =
+  check_filled w level0 steps orders (fun p ->
+    check_front p first second es points)

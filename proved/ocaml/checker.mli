@@ -194,6 +194,8 @@ val nodup : ('a1 -> 'a1 -> bool) -> 'a1 list -> 'a1 list
 
 val seq : nat -> nat -> nat list
 
+val repeat : 'a1 -> nat -> 'a1 list
+
 type q = { qnum : z; qden : positive }
 
 val inject_Z : z -> q
@@ -1445,3 +1447,72 @@ val stratified : knowledge_base -> (key1 -> nat) -> bool
 
 val check_derivations :
   knowledge_base -> (key1 -> nat) -> (data * reason) list -> bool
+
+val in_expression :
+  (term -> term) -> (key1 -> expression option) -> expression -> expression
+
+val in_formula :
+  (term -> term) -> (key1 -> expression option) -> formula -> formula
+
+val in_effect :
+  (term -> term) -> (key1 -> expression option) -> effect -> effect
+
+type choice_of_designs = { requirement : key1; design_type : key1;
+                           solves : key1; available : key1;
+                           sums : (key1 * key1) list;
+                           ruled_out : (formula * key1) list }
+
+val with_designs : choice_of_designs -> key1 list -> action -> action
+
+type mission = { mission_knowledge : knowledge_base; files : problem;
+                 schemas : (action * choice_of_designs option) list;
+                 bound_symbols : key1 list; object_for : (key1 -> key1) }
+
+val split_row : symbol list -> (key1 list * q option) option
+
+val names_in : symbol list -> key1 list
+
+val atom_rows : mission -> index -> key1 -> key1 list list
+
+val value_rows : mission -> index -> key1 -> (key1 list * q) list
+
+val bound_atoms : mission -> index -> atom list
+
+val bound_values : mission -> index -> (atom * q) list
+
+val filled_objects : mission -> index -> key1 -> key1 list
+
+val filled_action : (action * choice_of_designs option) -> key1 list -> action
+
+val filled_values : mission -> index -> q atom_map
+
+val fill : mission -> index -> key1 list list -> problem
+
+val required_objects : mission -> index -> choice_of_designs -> key1 list
+
+val order_accepted :
+  mission -> index -> ((action * choice_of_designs option) * key1 list) ->
+  bool
+
+val exact_eqb : q -> q -> bool
+
+val has_value0 : q atom_map -> (atom * q) -> bool
+
+val mentioned : mission -> index -> key1 list
+
+val named_apart : mission -> index -> bool
+
+val can_fill : mission -> index -> key1 list list -> bool
+
+val check_filled :
+  mission -> (key1 -> nat) -> (data * reason) list -> key1 list list ->
+  (problem -> bool) -> bool
+
+val check_mission :
+  mission -> (key1 -> nat) -> (data * reason) list -> key1 list list -> task
+  -> names -> (nat -> key1 list -> case_tree) -> case_tree -> argument ->
+  (state -> positive list) -> (nat * key1 list) list -> q option -> bool
+
+val check_mission_front :
+  mission -> (key1 -> nat) -> (data * reason) list -> key1 list list ->
+  objective -> objective -> evidence list -> point list -> bool

@@ -109,8 +109,9 @@ type problem = { task : C.problem; maximizes : bool; action_names : string list;
 let negative q = C.qred (C.qminus zero q)
 
 (* [metric] replaces the metric of the problem: minimize or maximize, and an expression.
-   [timed_literals] receives the timed initial literals, the last one first; without it, they are rejected. *)
-let problem ?metric ?timed_literals domain_text problem_text =
+   [timed_literals] receives the timed initial literals, the last one first; without it, they are rejected.
+   [other_objects] are names of objects without a type. *)
+let problem ?metric ?timed_literals ?(other_objects = []) domain_text problem_text =
   let sections kind text = match expressions text with
     | [List (Word "define" :: List [Word other; Word _] :: sections)] when other = kind ->
       List.map (function List (Word name :: items) -> name, items | _ -> reject "a section is expected") sections
@@ -138,7 +139,7 @@ let problem ?metric ?timed_literals domain_text problem_text =
   List.iter (fun kind ->
     let is_member (_, own) = is_below (List.length types) own kind in
     Hashtbl.replace members (type_key kind) (List.map (fun (name, _) -> object_key name) (List.filter is_member objects))) types;
-  let is_object name = List.mem_assoc name objects in
+  let is_object name = List.mem_assoc name objects || List.mem name other_objects in
   let known_object name = if is_object name then object_key name else reject "unknown object: %s" name in
 
   let typed_variables =
@@ -382,7 +383,7 @@ let problem ?metric ?timed_literals domain_text problem_text =
   { task = { C.objects = (fun kind -> Option.value ~default:[] (Hashtbl.find_opt members kind));
              actions = List.map snd actions; strata; initial_atoms = !initial_atoms; initial_values = !initial_values;
              goal_formula; metric; per_time; per_step };
-    maximizes; action_names = List.map fst actions; object_names = List.map fst objects }
+    maximizes; action_names = List.map fst actions; object_names = List.map fst objects @ other_objects }
 
 (* The claim: the metric of an optimal plan, or that there is no plan. *)
 let claim problem text =

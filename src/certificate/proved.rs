@@ -5,7 +5,9 @@
 //! the evidence with the function about which theorems are proved: `metaplan-proved-check` for a plan or its absence
 //! (theorems `optimal` and `unsolvable`, or `timed_optimal` if there are timed initial literals), and
 //! `metaplan-proved-front` for a Pareto front (theorem `front_optimal`). If the certificate has a knowledge base,
-//! `metaplan-proved-knowledge` checks the derivations of its facts (theorem `knowledge`).
+//! `metaplan-proved-knowledge` checks the derivations of its facts (theorem `knowledge`), and `metaplan-proved-mission`
+//! checks the claim for the problem that follows from them (theorems `mission_optimal`
+//! and `mission_front`).
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -22,8 +24,10 @@ const PREPARE: &str = "metaplan-proved-prepare";
 const CHECK: &str = "metaplan-proved-check";
 const FRONT: &str = "metaplan-proved-front";
 const KNOWLEDGE: &str = "metaplan-proved-knowledge";
+const MISSION: &str = "metaplan-proved-mission";
 /// Exit status of the programs on success. The next two constants are other exit statuses of all programs but
-/// `metaplan-proved-prepare`, as defined in `proved/ocaml/check.ml`, `check_front.ml` and `check_knowledge.ml`.
+/// `metaplan-proved-prepare`, as defined in `proved/ocaml/check.ml`, `check_front.ml`, `check_knowledge.ml` and
+/// `check_mission.ml`.
 const PROVED: i32 = 0;
 const REJECTED: i32 = 3;
 const NOT_PROVED: i32 = 30;
@@ -35,9 +39,15 @@ const TIMED: &str = "proved, with timed initial literals: ";
 const UNTIMED: &str = "proved: ";
 /// First words of the statement about the facts of a knowledge base.
 const FACTS: &str = "proved: exactly the ";
+/// First words of the statement about the problem of a mission. The second one has them if the metric is not that of
+/// the mission.
+const MISSION_PROBLEM: &str = "proved: for the problem that follows from the knowledge base: ";
+const OTHER_METRIC: &str =
+    "proved: for the problem that follows from the knowledge base, with another metric than the mission's: ";
 const COVERED_PARTS: [&str; 3] = ["task", "plan", "argument"];
 const COVERED_FRONT_PARTS: [&str; 2] = ["point", "front"];
 const DERIVATIONS: &str = "derivations";
+const FROM_KNOWLEDGE: &str = "knowledge";
 
 /// Paths of the programs of the proved checker.
 #[derive(Debug, Clone)]
@@ -46,6 +56,7 @@ pub struct ProvedChecker {
     check: PathBuf,
     front: PathBuf,
     knowledge: PathBuf,
+    mission: PathBuf,
 }
 
 /// Answer of the proved checker to a certificate, after the comparison with `metaplan-verify`.
@@ -63,6 +74,9 @@ pub enum Theorem {
         /// For a certificate with a knowledge base: the statement of theorem `knowledge` about the derivations, or the
         /// reason why the theorem does not apply.
         derivations: Option<Result<String, String>>,
+        /// For a certificate with a knowledge base: the statement of theorem `mission_optimal` or `mission_front` about
+        /// the problem that follows from it, or the reason why the theorem does not apply.
+        mission: Option<Result<String, String>>,
     },
     /// It is not shown that the claim follows from the theorem, for the given reason: for example, the proved checker
     /// does not cover a construct.
@@ -85,8 +99,8 @@ impl Theorem {
 
 impl ProvedChecker {
     /// Finds the programs in `folder` if it is given. Otherwise finds them in the directory of the running program or in
-    /// a directory of `PATH`. The programs for fronts and knowledge bases are not needed for other certificates, and may
-    /// be absent.
+    /// a directory of `PATH`. The programs for fronts, knowledge bases and missions are not needed for other certificates,
+    /// and may be absent.
     ///
     /// # Errors
     /// M145: no directory has both programs for certificates of a plan.
@@ -107,6 +121,7 @@ impl ProvedChecker {
                 check: program(folder, CHECK),
                 front: program(folder, FRONT),
                 knowledge: program(folder, KNOWLEDGE),
+                mission: program(folder, MISSION),
             })
             .find(|checker| checker.prepare.is_file() && checker.check.is_file())
             .ok_or_else(|| {
@@ -144,7 +159,8 @@ impl ProvedChecker {
         if let Err(reason) = require_read(directory, claim) {
             return Ok(Theorem::None(reason));
         }
-        let answer = self.answer(directory, claim, stop)?;
+        let folder = tempfile::tempdir().map_err(|error| failed("a temporary directory", &error))?;
+        let answer = self.answer(directory, claim, folder.path(), stop)?;
         let accepted = covered.iter().all(|part| {
             let has_part = *part != "plan" || *claim != Claim::Unsolvable;
             let mut results = report.parts.iter().filter(|verified| verified.part == *part).peekable();
@@ -169,7 +185,14 @@ impl ProvedChecker {
                     (Some(VerifiedPart { result: Err(_), .. }), Some(Ok(accepted))) => {
                         format!("the proved checker accepts the derivations ({accepted})")
                     }
-                    _ => return Ok(Theorem::Holds { name, statement, parts, derivations }),
+                    _ => {
+                        let verified = report.parts.iter().find(|part| part.part == FROM_KNOWLEDGE);
+                        let mission = |part: &VerifiedPart| {
+                            self.mission(directory, claim, part.result.is_ok(), folder.path(), stop)
+                        };
+                        let mission = verified.map(mission).transpose()?;
+                        return Ok(Theorem::Holds { name, statement, parts, derivations, mission });
+                    }
                 }
             }
             Answer::Accepted(statement) => {
@@ -202,9 +225,50 @@ impl ProvedChecker {
         })
     }
 
-    fn answer(&self, directory: &Path, claim: &Claim, stop: &dyn Fn() -> bool) -> Result<Answer, Message> {
-        let folder = tempfile::tempdir().map_err(|error| failed("a temporary directory", &error))?;
-        let errors = folder.path().join("errors");
+    /// Runs the program for missions on the evidence in `folder`. Returns the proved statement; an error if nothing is
+    /// proved, with the reason. `is_verified` is the result of `metaplan-verify` for the part `knowledge`.
+    fn mission(
+        &self,
+        directory: &Path,
+        claim: &Claim,
+        is_verified: bool,
+        folder: &Path,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Result<String, String>, Message> {
+        if !self.mission.is_file() {
+            return Ok(Err(format!("the program `{MISSION}` is missing")));
+        }
+        let mut check = Command::new(&self.mission);
+        let last = match claim {
+            Claim::Front(front) => front.points.len(),
+            Claim::Optimal { .. } | Claim::Unsolvable => 0,
+        };
+        check.arg(directory).args((0..=last).map(|position| evidence_file(folder, position)));
+        let (output, errors) = (folder.join("mission"), folder.join("errors"));
+        Ok(match checked(check, MISSION, &output, &errors, stop)? {
+            Answer::Accepted(statement) if !states_for_mission(&statement, claim) => {
+                Err(format!("`{MISSION}` proves something else: {statement}"))
+            }
+            // The theorem is about the mission's files. It also holds if the problem of the certificate has other facts
+            // that do not matter.
+            Answer::Accepted(_) if !is_verified => {
+                Err("the problem of the certificate does not follow from the knowledge base".to_owned())
+            }
+            Answer::Accepted(statement) => Ok(statement),
+            Answer::Rejected => Err("the proved checker does not accept the mission".to_owned()),
+            Answer::None(reason) => Err(reason),
+        })
+    }
+
+    /// Writes evidence to files in `folder`, and runs the program for the claim.
+    fn answer(
+        &self,
+        directory: &Path,
+        claim: &Claim,
+        folder: &Path,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Answer, Message> {
+        let errors = folder.join("errors");
         let (certificates, checker, name) = match claim {
             Claim::Front(front) => {
                 let members = 0..=front.points.len();
@@ -216,7 +280,7 @@ impl ProvedChecker {
         let mut check = Command::new(checker);
         check.arg(directory);
         for (certificate, position) in certificates.iter().zip(0_usize..) {
-            let evidence = folder.path().join(format!("evidence{position}"));
+            let evidence = evidence_file(folder, position);
             let mut prepare = Command::new(&self.prepare);
             prepare.arg(certificate);
             match run(prepare, &evidence, &errors, stop)? {
@@ -226,8 +290,12 @@ impl ProvedChecker {
             }
             check.arg(&evidence);
         }
-        checked(check, name, &folder.path().join("output"), &errors, stop)
+        checked(check, name, &folder.join("output"), &errors, stop)
     }
+}
+
+fn evidence_file(folder: &Path, position: usize) -> PathBuf {
+    folder.join(format!("evidence{position}"))
 }
 
 /// Runs a program that checks with a proved function, and interprets its exit status.
@@ -274,9 +342,17 @@ fn require_read(directory: &Path, claim: &Claim) -> Result<(), String> {
 /// Returns `true` if the statement of the proved checker equals the claim of the certificate. They can differ,
 /// because the program takes its claim from the untrusted evidence.
 fn states(statement: &str, claim: &Claim) -> bool {
-    let Some(statement) = statement.strip_prefix(TIMED).or_else(|| statement.strip_prefix(UNTIMED)) else {
-        return false;
-    };
+    let statement = statement.strip_prefix(TIMED).or_else(|| statement.strip_prefix(UNTIMED));
+    statement.is_some_and(|statement| is_claim(statement, claim))
+}
+
+/// Returns `true` if the statement of the proved checker about a mission equals the claim of the certificate.
+fn states_for_mission(statement: &str, claim: &Claim) -> bool {
+    let statement = statement.strip_prefix(MISSION_PROBLEM).or_else(|| statement.strip_prefix(OTHER_METRIC));
+    statement.is_some_and(|statement| is_claim(statement, claim))
+}
+
+fn is_claim(statement: &str, claim: &Claim) -> bool {
     match claim {
         Claim::Unsolvable => statement == "there is no plan",
         Claim::Front(front) => {
@@ -365,5 +441,9 @@ mod tests {
         assert!(states(&format!("{timed}the plan of 2 steps is optimal, metric 3.5"), &metric("3.5")));
         assert!(!states(&format!("{timed}the plan of 2 steps is optimal, metric 3.5"), &metric("3")));
         assert!(!states("proved: there is no plan", &metric("8")));
+        let mission = format!("{MISSION_PROBLEM}the plan of 4 steps is optimal, metric 408");
+        assert!(states_for_mission(&mission, &metric("408")) && !states_for_mission(&mission, &metric("8")));
+        assert!(!states(&mission, &metric("408")) && !states_for_mission(optimal, &metric("408")));
+        assert!(states_for_mission(&format!("{OTHER_METRIC}there is no plan"), &Claim::Unsolvable));
     }
 }

@@ -39,7 +39,7 @@ pub struct Arguments {
     /// Mark a component as failed (repeatable).
     #[arg(long, value_name = "COMPONENT", requires = "mission")]
     fail: Vec<String>,
-    /// Also run the checker that is extracted from a Coq proof, and name the parts that the theorem covers. Its programs `metaplan-proved-prepare`, `metaplan-proved-check`, `metaplan-proved-front` and `metaplan-proved-knowledge` are found in FOLDER, or in the folder of this program and in PATH.
+    /// Also run the checker that is extracted from a Coq proof, and name the parts that the theorem covers. Its programs `metaplan-proved-prepare`, `metaplan-proved-check`, `metaplan-proved-front`, `metaplan-proved-knowledge` and `metaplan-proved-mission` are found in FOLDER, or in the folder of this program and in PATH.
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, require_equals = true)]
     #[expect(clippy::option_option, reason = "the option may have no value")]
     proved: Option<Option<PathBuf>>,

@@ -33,7 +33,10 @@ fn theorem_covers_the_parts_about_the_pddl_files() {
     let covers = "proved: theorem `optimal` covers the parts task, plan, argument\n";
     let no_plan = "proved: theorem `unsolvable` covers the parts task, argument\n";
     let timed = "proved: theorem `timed_optimal` covers the parts task, plan, argument\n";
-    let with_knowledge = format!("proved: theorem `knowledge` covers the part derivations\n{covers}");
+    let with_knowledge = format!(
+        "proved: theorem `knowledge` covers the part derivations\nproved: theorem `mission_optimal` covers the part \
+         knowledge\n{covers}"
+    );
     for (certificate, status, line) in [
         (ugv.as_str(), 0, with_knowledge.as_str()),
         ("proved/tests/battery", 0, covers),
@@ -65,6 +68,48 @@ fn theorem_covers_the_parts_about_the_pddl_files() {
     let answer = verify(&[&ugv, "--proved", "--format", "json"]).json();
     let message = "proved: exactly the 130 facts hold, 9 of them by rules";
     assert_eq!(answer["theorem"]["derivations"], json!({"proved": true, "message": message}), "{answer:#}");
+    let message = "proved: for the problem that follows from the knowledge base: the plan of 4 steps is optimal, metric 408";
+    assert_eq!(answer["theorem"]["knowledge"], json!({"proved": true, "message": message}), "{answer:#}");
+}
+
+#[test]
+fn theorem_covers_missions_with_explicit_and_plain_domains() {
+    if !has_checker() {
+        return;
+    }
+    let line = "\nproved: theorem `mission_optimal` covers the part knowledge\n";
+    for mission in [
+        "missions/uuv.toml",
+        "missions/ugv_plain.toml",
+        "missions/uuv_plain.toml",
+        "missions/camara_like.toml",
+        "missions/templates/warehouse/mission.toml",
+        "integrations/ros/examples/nav2/mission.toml",
+        "tests/program/greenhouse/mission.toml",
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let certificate = certificate(folder.path(), &["plan", mission]);
+        let outcome = verify(&[&certificate, "--proved"]);
+        assert!(outcome.status == 0 && outcome.stdout.contains(line), "{mission}: {outcome:#?}");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let other = ["plan", "missions/ugv.toml", "--minimize", "battery_used"];
+    let certificate = certificate(folder.path(), &other);
+    let answer = verify(&[&certificate, "--proved", "--format", "json"]).json();
+    let message = answer["theorem"]["knowledge"]["message"].as_str().unwrap_or_default();
+    assert!(message.contains("with another metric than the mission's"), "{answer:#}");
+    let folder = tempfile::tempdir().expect("a folder");
+    let front = folder.path().join("front").display().to_string();
+    let objectives = "total-time,battery_used";
+    let outcome = metaplan_in(
+        &root(),
+        &["plan", "missions/ugv.toml", "--pareto", objectives, "--certificate", &front],
+        "",
+    );
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let outcome = verify(&[&front, "--proved"]);
+    let line = "\nproved: theorem `mission_front` covers the part knowledge\n";
+    assert!(outcome.status == 0 && outcome.stdout.contains(line), "{outcome:#?}");
 }
 
 /// A program that accepts all derivations.
@@ -99,6 +144,37 @@ fn answer_about_derivations_is_compared() {
         if let Some(script) = script {
             add_stub(programs.path(), "metaplan-proved-knowledge", script);
         }
+        let outcome = with_stubs(&ugv, &programs, &[]);
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+        let missing = "knowledge NOT proved by a theorem: the program `metaplan-proved-mission` is missing";
+        assert!(outcome.stdout.ends_with(&format!("{line}\n{missing}\n{covers}")), "{line}: {outcome:#?}");
+    }
+    let optimal = "the plan of 4 steps is optimal, metric 408";
+    let problem = "proved: for the problem that follows from the knowledge base: ";
+    let covered = "proved: theorem `mission_optimal` covers the part knowledge";
+    let states = |statement: &str| format!("test -s \"$2\" && echo '{statement}'");
+    for (script, line) in [
+        (states(&format!("{problem}{optimal}")), covered),
+        (
+            states(&format!("proved: {optimal}")),
+            "knowledge NOT proved by a theorem: `metaplan-proved-mission` proves something else: proved: the plan of 4 steps is optimal, metric 408",
+        ),
+        (
+            states(&format!("{problem}there is no plan")),
+            "knowledge NOT proved by a theorem: `metaplan-proved-mission` proves something else: proved: for the problem that follows from the knowledge base: there is no plan",
+        ),
+        (
+            "echo 'not proved'; exit 30".to_owned(),
+            "knowledge NOT proved by a theorem: the proved checker does not accept the mission",
+        ),
+        (
+            "echo 'rejected: not covered: either'; exit 3".to_owned(),
+            "knowledge NOT proved by a theorem: not covered: either",
+        ),
+    ] {
+        let programs = stubs("echo evidence", check);
+        add_stub(programs.path(), "metaplan-proved-knowledge", KNOWN);
+        add_stub(programs.path(), "metaplan-proved-mission", &script);
         let outcome = with_stubs(&ugv, &programs, &[]);
         assert_eq!(outcome.status, 0, "{outcome:#?}");
         assert!(outcome.stdout.ends_with(&format!("{line}\n{covers}")), "{line}: {outcome:#?}");
