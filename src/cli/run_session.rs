@@ -360,6 +360,7 @@ impl<'a> Session<'a> {
         Ok(flow)
     }
 
+        self.control.keep_planner(&thoughts);
     fn answer(&self, number: u64, answers: &[Answer], read: Instant) -> Result<Flow, Failure> {
         warn_if_unrecorded(self.common, answers);
         let flow = flow(self.outlet.answer(number, answers, read))?;
