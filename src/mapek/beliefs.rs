@@ -54,7 +54,7 @@ pub struct Beliefs {
     pub(super) waits: BTreeMap<u64, Wait>,
     pub(super) reports_actions: bool,
     pub(super) lines: u64,
-    /// Whether a line stated its time, so that time advances with lines only.
+    /// Whether an accepted line stated its time, so that time advances with lines only.
     pub(super) has_times: bool,
     pub(super) numbers: Numbers,
     pub(super) now: Duration,
@@ -257,7 +257,7 @@ impl Beliefs {
         self.lines
     }
 
-    /// Returns `true` if a received line stated its time. Time then advances with lines only.
+    /// Returns `true` if an accepted line stated its time. Time then advances with lines only.
     pub fn has_times(&self) -> bool {
         self.has_times
     }
