@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use crate::configure::{Keeper, KeeperAnswer};
 use crate::journal::Journal;
-use crate::mapek::{Clock as _, Observation, Recoverable as _, SystemClock};
+use crate::mapek::{Observation, Recoverable as _, SystemClock};
 
 use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};
@@ -23,7 +23,9 @@ pub(super) struct KeeperSession<'a> {
     clock: SystemClock,
     /// Time of the last line or timer event of the resumed journal, since the start; 0 without such an event.
     begun: Duration,
-    /// `true` if a line had a time. Time then advances with lines only.
+    /// Time of the last line or timer by the clock.
+    latest: Duration,
+    /// `true` if an accepted line had a time. Time then advances with lines only.
     has_times: bool,
     /// Number of blank lines that were read. The loop does not receive them.
     blank_lines: u64,
@@ -41,7 +43,18 @@ impl<'a> KeeperSession<'a> {
             Some(Resumed { journal, answers, .. }) => (Some(journal), answers),
         };
         let (begun, has_times, clock) = (keeper.now(), keeper.has_times(), SystemClock::default());
-        Self { common, keeper, journal, resumed_answers, outlet, clock, begun, has_times, blank_lines: 0 }
+        Self {
+            common,
+            keeper,
+            journal,
+            resumed_answers,
+            outlet,
+            clock,
+            begun,
+            latest: begun,
+            has_times,
+            blank_lines: 0,
+        }
     }
 
     /// Answers all lines of a file. Filters that become due between two lines are handled together with the later
@@ -96,26 +109,37 @@ impl<'a> KeeperSession<'a> {
 
     fn answer_line(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {
         let observation = Observation::parse(&line.text);
-        self.has_times = self.has_times || line.now.is_some() || observation.time.is_some();
-        let now = self.begun + line.now.unwrap_or_else(|| self.clock.now());
+        // The wait of a line for earlier ones does not count as silence of the robot.
+        let now = match line.now {
+            Some(now) => self.begun + now,
+            None => self.monotone_time(read),
+        };
         self.blank_lines += line.blank_lines;
         self.outlet.heard(self.number() + 1, now, &line.text);
         let answers = self.handle(&line.text, &observation, now)?;
+        self.has_times |= line.now.is_some() || self.keeper.has_times();
         self.warn(&answers);
         flow(self.outlet.answer(self.number(), &answers, read))
+    }
+
+    /// Returns the time since the start at which a line arrived or a timer has ended, but never a time before the previous
+    /// one.
+    fn monotone_time(&mut self, moment: Instant) -> Duration {
+        self.latest = self.latest.max(self.begun + self.clock.at(moment));
+        self.latest
     }
 
     /// Returns the time until a filter is due, for example after a debounce time. Returns `None` if
     /// no filter is, or if lines have times.
     fn pause(&mut self) -> Option<Duration> {
         let due = self.keeper.due().filter(|_| !self.has_times)?;
-        Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
+        Some(due.saturating_sub(self.begun + self.clock.at(Instant::now())).max(MIN_PAUSE))
     }
 
     /// Handles the due time of a filter, if it has passed. The answers have the number of the last
     /// input line, because time has no line of its own.
     fn elapse(&mut self) -> Result<Flow, Failure> {
-        let now = self.begun + self.clock.now();
+        let now = self.monotone_time(Instant::now());
         if self.keeper.due().is_none_or(|due| due > now) {
             return Ok(Flow::GoesOn);
         }

@@ -16,7 +16,7 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel, sync_
 use std::time::{Duration, Instant};
 
 use crate::journal::{Journal, Recovery};
-use crate::mapek::{Answer, Clock as _, Loop, Observation, ParallelSearch, SystemClock, Thoughts};
+use crate::mapek::{Answer, Loop, Observation, ParallelSearch, SystemClock, Thoughts};
 use crate::message::Message;
 
 use crate::cli::common::{Common, Failure};
@@ -27,6 +27,9 @@ use crate::cli::run_outlet::{Outlet, is_over, unwritten, warn_if_unrecorded};
 pub(super) const MAX_WAITING: usize = 1024;
 
 pub(super) const MIN_PAUSE: Duration = Duration::from_millis(1);
+
+/// Upper limit on the time between the arrival of a line and its answers that counts as part of the robot's deadlines.
+const MAX_WAIT: Duration = Duration::from_secs(1);
 
 pub(super) enum Input {
     Line(Line, Instant),
@@ -75,12 +78,16 @@ pub(super) struct Session<'a> {
     /// Time of the last line or timer event of the resumed journal, since the start of the mission; 0 without
     /// such an event.
     begun: Duration,
+    /// Time for which the clock of the mission was stopped, see [`Session::set_back`].
+    delay: Duration,
+    /// Time of the last line or timer by the clock of the mission.
+    latest: Duration,
     /// Number of the current line, shared with the thread that reports the progress of planning.
     line: Arc<AtomicU64>,
     /// Number of the last line and the time at which it was read, until the line is acknowledged.
     open: Option<(u64, Instant)>,
     search: ParallelSearch,
-    /// `true` if a line had a time of its own. Time then advances with lines only.
+    /// `true` if an accepted line had a time of its own. Time then advances with lines only.
     has_times: bool,
     /// Number of blank lines that were read. The loop does not receive them.
     blank_lines: u64,
@@ -99,15 +106,16 @@ impl<'a> Session<'a> {
             Some(Resumed { journal, answers, .. }) => (Some(journal), answers),
         };
         let (begun, has_times) = (control.beliefs().now(), control.beliefs().has_times());
-        let clock = SystemClock::default();
         Self {
             common,
             control,
             journal,
             resumed_answers,
             outlet,
-            clock,
+            clock: SystemClock::default(),
             begun,
+            delay: Duration::ZERO,
+            latest: begun,
             line,
             open: None,
             search: ParallelSearch::default(),
@@ -195,7 +203,7 @@ impl<'a> Session<'a> {
     }
 
     fn answer_line(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {
-        let now = self.heard(line);
+        let now = self.heard(line, read);
         let answers = match &mut self.journal {
             None => self.control.handle(&Observation::parse(&line.text), now),
             Some(journal) => {
@@ -212,8 +220,12 @@ impl<'a> Session<'a> {
     }
 
     /// Forwards a line to the recording and the web page. Returns the time of the line since the start of the mission.
-    fn heard(&mut self, line: &Line) -> Duration {
-        let now = self.begun + line.now.unwrap_or_else(|| self.clock.now());
+    /// This is the time of its arrival, so that its wait for earlier lines does not count as silence of the robot.
+    fn heard(&mut self, line: &Line, read: Instant) -> Duration {
+        let now = match line.now {
+            Some(now) => self.begun + now,
+            None => self.monotone_time(read),
+        };
         self.blank_lines += line.blank_lines;
         let number = self.number() + 1;
         self.line.store(number, Ordering::Relaxed);
@@ -233,14 +245,14 @@ impl<'a> Session<'a> {
             self.has_times = true;
             return self.recorded(line, read);
         }
-        self.has_times = self.has_times || Observation::parse(&line.text).time.is_some();
-        let now = self.heard(line);
+        let now = self.heard(line, read);
         let mut answers = match &mut self.journal {
             None => self.control.react(&Observation::parse(&line.text), now),
             Some(journal) => {
                 journal.observe(&mut self.control, &line.text, now).map_err(|error| unwritten(&error))?
             }
         };
+        self.has_times |= self.control.beliefs().has_times();
         self.open = Some((self.number(), read));
         self.search.update(Some(self.control.question()));
         // A reaction with effects is written at once. A reaction without effects is joined with the deliberation, so
@@ -252,23 +264,47 @@ impl<'a> Session<'a> {
             && self.control.has_agenda()
             && let Some(more) = self.control.deliberate_at_once()
         {
+            self.search.reset();
             answers.extend(more);
             self.decided(&mut answers)?;
         } else if let Some(journal) = &mut self.journal {
             journal.reacted(&mut self.control, &mut answers).map_err(|error| unwritten(&error))?;
         }
-        self.say(&answers)
+        let flow = self.say(&answers)?;
+        self.set_back(&answers);
+        Ok(flow)
+    }
+
+    /// Sets the clock of the mission back to the time of the loop if these answers request effects of a line that has
+    /// waited. Their deadlines begin at the time of the loop, and must not pass before the robot receives them.
+    fn set_back(&mut self, answers: &[Answer]) {
+        let wait = self.time(Instant::now()).saturating_sub(self.control.beliefs().now());
+        if wait > MAX_WAIT && !self.has_times && answers.iter().any(|answer| answer.effect().is_some()) {
+            self.delay += wait;
+        }
+    }
+
+    /// Returns the time since the start of the mission at a moment.
+    fn time(&self, moment: Instant) -> Duration {
+        (self.begun + self.clock.at(moment)).saturating_sub(self.delay)
+    }
+
+    /// Returns the time since the start of the mission at which a line arrived or a timer has ended, but never a time
+    /// before the previous one: a line may have arrived before the end of the previous timer.
+    fn monotone_time(&mut self, moment: Instant) -> Duration {
+        self.latest = self.latest.max(self.time(moment));
+        self.latest
     }
 
     /// Returns the time until the loop must act without a line. Returns `None` if nothing is due, or if lines have
     /// times of their own.
     fn pause(&mut self) -> Option<Duration> {
         let due = self.control.due().filter(|_| !self.has_times)?;
-        Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
+        Some(due.saturating_sub(self.time(Instant::now())).max(MIN_PAUSE))
     }
 
     fn elapse(&mut self) -> Result<Flow, Failure> {
-        let now = self.begun + self.clock.now();
+        let now = self.monotone_time(Instant::now());
         if self.control.due().is_none_or(|due| due > now) {
             return Ok(Flow::GoesOn);
         }
@@ -308,8 +344,11 @@ impl<'a> Session<'a> {
 
     fn deliberate(&mut self, channels: &Channels) -> Result<Flow, Failure> {
         if let Some(mut answers) = self.control.deliberate_at_once() {
+            self.search.reset();
             self.decided(&mut answers)?;
-            return self.say(&answers);
+            let flow = self.say(&answers)?;
+            self.set_back(&answers);
+            return Ok(flow);
         }
         let thinker = self.control.thinker();
         self.search.begin(thinker.handle());
@@ -321,6 +360,7 @@ impl<'a> Session<'a> {
     /// repeated, except after several cancelled searches in a row ([`ParallelSearch`]).
     fn conclude(&mut self, result: SearchResult) -> Result<Flow, Failure> {
         let thoughts = result.unwrap_or_else(|panic| resume_unwind(panic));
+        self.control.keep_planner(&thoughts);
         let is_late = self.search.accepts_late_plans();
         if self.search.end() {
             return Ok(Flow::GoesOn);

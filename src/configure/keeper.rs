@@ -173,7 +173,7 @@ impl Keeper {
         self.now
     }
 
-    /// Returns `true` if a received line stated its time. Time then advances with lines only.
+    /// Returns `true` if an accepted line stated its time. Time then advances with lines only.
     pub fn has_times(&self) -> bool {
         self.has_times
     }
@@ -219,7 +219,6 @@ impl Keeper {
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);
-        self.has_times |= observation.time.is_some();
         let (time, refusal_of_time) = time_of_line(self.now, now, observation.time);
         self.now = time;
         // A line that was received before must not have an effect again.
@@ -239,6 +238,7 @@ impl Keeper {
                 }
             }
         }
+        self.has_times |= understood && observation.time.is_some();
         // A rejected line may be sent again with the same number.
         if understood && let Some(seq) = observation.sequence {
             self.numbers.insert(seq);

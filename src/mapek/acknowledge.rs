@@ -11,7 +11,7 @@
 //! Some robots never acknowledge an effect by its number. For such a robot, the report also implies that the
 //! reconfigurations before the request have arrived, because an action starts with the configuration of its request.
 
-use crate::mapek::answer::Command;
+use crate::mapek::answer::{Command, Effect};
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::receipts::{Acknowledged, Before};
 
@@ -32,14 +32,22 @@ pub(super) enum Failure {
 }
 
 impl Beliefs {
-    /// Records an acknowledgement by number. The effect is then no longer outstanding. Returns [`Receipt::Unknown`] if
-    /// the loop has created no effect with this number.
+    /// Records an acknowledgement by number. The effect is then no longer outstanding, unless it is the cancellation of
+    /// the action under way. Returns [`Receipt::Unknown`] if the loop has created no effect with this number.
     pub(super) fn acknowledge(&mut self, effect: u64) -> Receipt {
         if effect == 0 || effect > self.effects {
             return Receipt::Unknown;
         }
-        self.waits.remove(&effect);
+        let is_first = self.waits.remove(&effect).is_some();
         self.receipts.by_number = true;
+        let is_cancellation = |pending: &Effect| matches!(pending.command, Command::Cancel { .. });
+        if self.outstanding.get(&effect).is_some_and(is_cancellation) {
+            // The cancellation stays outstanding until the action ends, because the report of the end may be lost.
+            if let Some(running) = self.running.as_mut().filter(|_| is_first) {
+                (running.last_report, running.overdue) = (self.now, 0);
+            }
+            return Receipt::Recorded;
+        }
         // The effect need not be outstanding: a report of the action may have confirmed it, or a later effect
         // superseded it.
         if let Some(outstanding) = self.outstanding.remove(&effect) {

@@ -13,7 +13,7 @@ use std::time::Duration;
 use num_rational::BigRational;
 use pddl::ast::Direction;
 
-use crate::mapek::analyze::{Findings, missing_conclusions};
+use crate::mapek::analyze::{Findings, error, missing_conclusions};
 use crate::mapek::answer::Answer;
 use crate::mapek::ask::{Outcome, Question};
 use crate::mapek::beliefs::{Beliefs, Retry, Running};
@@ -75,8 +75,11 @@ impl Adaptation<'_> {
         }
         let interruptions = std::mem::take(&mut changes.interruptions);
         if let Some(running) = self.beliefs.running.clone() {
-            // The report of the action's end leads to the next plan.
+            // The report of the action's end leads to the next plan, which is the first one for these changes.
             if running.cancelling {
+                if is_change {
+                    self.beliefs.failures = None;
+                }
                 return;
             }
             if !interruptions.is_empty() {
@@ -98,7 +101,10 @@ impl Adaptation<'_> {
             changes.reasons.push(format!("{design}, which the plan uses, is not available any more"));
         }
         changes.reasons.extend(interruptions);
-        changes.reasons.extend(findings.errors);
+        // An objective may have recovered since.
+        let errors: Vec<String> =
+            self.beliefs.statuses.iter().map(|(objective, statuses)| error(objective, statuses)).collect();
+        changes.reasons.extend(findings.errors.into_iter().filter(|sentence| errors.contains(sentence)));
         // Conditions, axioms and the goal can read the availability of designs that no step uses.
         let is_validated = changes.facts || !findings.lost.is_empty() || !findings.gained.is_empty();
         // After the goal is reached, there is no plan, and the validator checks the goal alone.
@@ -303,6 +309,8 @@ impl Adaptation<'_> {
         match weigh(reason, can_go_on, going_on, without, gained) {
             Interruption::None => false,
             Interruption::Cancel { because } => {
+                // The plan after the cancellation is the first one for the changes that have led to it.
+                self.beliefs.failures = None;
                 cancel(self.beliefs, running, because, answers);
                 true
             }

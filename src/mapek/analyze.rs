@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::knowledge::{Fault, Knowledge};
 use crate::mapek::answer::{Answer, DesignChange, ObjectiveChange};
 use crate::mapek::beliefs::Beliefs;
+use crate::mapek::changes::add_new;
 use crate::mapek::monitor::Base;
 
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -35,7 +36,7 @@ impl Findings {
                 self.gained.insert(design);
             }
         }
-        self.errors.extend(later.errors);
+        add_new(&mut self.errors, later.errors);
     }
 }
 
@@ -94,10 +95,14 @@ pub(super) fn analyze(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) -> Findi
         set.insert(change.design.clone());
     }
     let errors = objectives.iter().filter(|change| !change.statuses.is_empty());
-    findings.errors =
-        errors.map(|change| format!("{} is {}", change.objective, change.statuses.join(", "))).collect();
+    findings.errors = errors.map(|change| error(&change.objective, &change.statuses)).collect();
     answers.extend(inferred(designs, objectives));
     findings
+}
+
+/// Returns the sentence in [`Findings::errors`] about an objective in error.
+pub(super) fn error(objective: &str, statuses: &[String]) -> String {
+    format!("{objective} is {}", statuses.join(", "))
 }
 
 pub(crate) fn inferred(designs: Vec<DesignChange>, objectives: Vec<ObjectiveChange>) -> Option<Answer> {

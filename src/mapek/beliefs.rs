@@ -54,7 +54,7 @@ pub struct Beliefs {
     pub(super) waits: BTreeMap<u64, Wait>,
     pub(super) reports_actions: bool,
     pub(super) lines: u64,
-    /// Whether a line stated its time, so that time advances with lines only.
+    /// Whether an accepted line stated its time, so that time advances with lines only.
     pub(super) has_times: bool,
     pub(super) numbers: Numbers,
     pub(super) now: Duration,
@@ -78,7 +78,8 @@ pub(super) struct Running {
     /// Whether the action is suspended only until planning has finished.
     pub(super) provisional: bool,
     pub(super) request: u64,
-    /// Time of the request, resumption or last report, whichever was last, since the start of the mission.
+    /// Time of the request, the resumption, the acknowledgement of the cancellation or the last report, whichever was
+    /// last, since the start of the mission.
     pub(super) last_report: Duration,
     /// Backoff factor: 0 after a report, 1 after the first missed deadline, then doubled by each further one.
     pub(super) overdue: u32,
@@ -245,7 +246,8 @@ impl Beliefs {
         Some(Outlook { domain, problem, steps, first, is_under_way: running.is_some() })
     }
 
-    /// Effects that still await an acknowledgement, in the order of their numbers.
+    /// Effects that still await an acknowledgement, and the cancellation of the action under way, in the order of their
+    /// numbers.
     pub fn outstanding(&self) -> impl Iterator<Item = &Effect> {
         self.outstanding.values()
     }
@@ -255,7 +257,7 @@ impl Beliefs {
         self.lines
     }
 
-    /// Returns `true` if a received line stated its time. Time then advances with lines only.
+    /// Returns `true` if an accepted line stated its time. Time then advances with lines only.
     pub fn has_times(&self) -> bool {
         self.has_times
     }

@@ -35,6 +35,16 @@ pub(super) struct Changes {
     pub(super) filtered: Vec<Answer>,
 }
 
+/// Adds those sentences that the list does not contain. A status that changes back and forth during a long search gives
+/// equal sentences again and again.
+pub(super) fn add_new(sentences: &mut Vec<String>, added: Vec<String>) {
+    for sentence in added {
+        if !sentences.contains(&sentence) {
+            sentences.push(sentence);
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(super) enum Base {
     #[default]
@@ -78,8 +88,8 @@ impl Changes {
         self.ended |= ended;
         self.news = self.news.saturating_add(news);
         self.observed |= observed;
-        self.interruptions.extend(interruptions);
-        self.reasons.extend(reasons);
+        add_new(&mut self.interruptions, interruptions);
+        add_new(&mut self.reasons, reasons);
         self.filtered.extend(filtered);
     }
 }

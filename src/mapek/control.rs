@@ -203,7 +203,6 @@ impl Loop {
         // Computed plans that no decision has recorded are obsolete.
         self.planner.computed.clear();
         self.beliefs.lines += u64::from(!observation.is_timer);
-        self.beliefs.has_times |= observation.time.is_some();
         let (time, refusal_of_time) = time_of_line(self.beliefs.now, now, observation.time);
         self.beliefs.now = time;
         if let Some(refusal) =
@@ -232,6 +231,8 @@ impl Loop {
             self.abandon(effect, &mut changes);
         }
         answers.append(&mut changes.filtered);
+        // A refused line must not stop the timers: its time may be a time of day.
+        self.beliefs.has_times |= understood && observation.time.is_some();
         // A refused line does not use up its number, so that a corrected line can have it.
         if understood || changes.any() {
             if let Some(sequence) = observation.sequence.filter(|_| understood) {
@@ -343,7 +344,7 @@ impl Loop {
         filters.into_iter().chain(improvement).chain(retry).chain(deadline).min()
     }
 
-    /// Returns the effects that still await an acknowledgement as answers, to be requested again after a restart.
+    /// Returns the [outstanding](Beliefs::outstanding) effects as answers, to be requested again after a restart.
     pub fn repeat(&self) -> Vec<Answer> {
         let again = |effect: &Effect| Answer::Effect(Effect { repeated: true, ..effect.clone() });
         self.beliefs.outstanding().map(again).collect()

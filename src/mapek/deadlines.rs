@@ -107,15 +107,16 @@ fn check_effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<An
     expired
 }
 
-/// Returns the outstanding cancellation of the action under way, if the robot has never acknowledged an effect by its
-/// number. For such a robot, the cancellation is repeated until the action ends, because every robot must report the
-/// end of an action.
+/// Returns the cancellation of the action under way, if it is acknowledged or the robot has never acknowledged an effect
+/// by its number. It is then repeated until the action ends, because every robot must report the end of an action.
 fn open_cancel(beliefs: &Beliefs) -> Option<&Effect> {
     let running = beliefs.running.as_ref().filter(|action| action.cancelling)?;
     let is_cancel = |effect: &&Effect| {
         effect.action == running.action && matches!(effect.command, Command::Cancel { .. })
     };
-    beliefs.outstanding.values().find(is_cancel).filter(|_| !beliefs.receipts.are_sent())
+    let is_awaited =
+        |effect: &&Effect| beliefs.receipts.are_sent() && beliefs.waits.contains_key(&effect.number);
+    beliefs.outstanding.values().find(is_cancel).filter(|effect| !is_awaited(effect))
 }
 
 fn check_action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>) {

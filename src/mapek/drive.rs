@@ -41,6 +41,13 @@ impl Default for SystemClock {
     }
 }
 
+impl SystemClock {
+    /// Returns the time from the creation of the clock to a moment; 0 for an earlier moment.
+    pub fn at(&self, moment: Instant) -> Duration {
+        moment.saturating_duration_since(self.0)
+    }
+}
+
 impl Clock for SystemClock {
     fn now(&mut self) -> Duration {
         self.0.elapsed()

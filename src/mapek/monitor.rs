@@ -17,6 +17,7 @@ use crate::mapek::fields::Refusal;
 use crate::mapek::filter::Filters;
 use crate::mapek::resume::gradual_functions;
 use crate::mapek::settings::Settings;
+use crate::mapek::step::PlannedStep;
 use crate::message::{Message, did_you_mean};
 use crate::mission::Mission;
 use crate::number;
@@ -105,12 +106,17 @@ impl BeliefUpdate<'_> {
             Event::Succeeded { action } => self.succeeded(*action),
             Event::Failed { action, reason } => {
                 let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
-                self.failed(*action)?;
+                let step = self.ended_early(*action)?.step;
+                self.count_failure(step);
                 self.changes.reasons.push(format!("action {action} has failed{reason}"));
                 Ok(())
             }
             Event::Cancelled { action } => {
-                self.ended_early(*action)?;
+                let running = self.ended_early(*action)?;
+                // A robot that cannot suspend an action reports its cancellation, possibly after the resumption.
+                if !running.cancelling && !running.suspended && !running.resumed {
+                    self.count_failure(running.step);
+                }
                 self.changes.reasons.push(format!("action {action} was cancelled"));
                 Ok(())
             }
@@ -118,6 +124,7 @@ impl BeliefUpdate<'_> {
                 let condition = self.beliefs.mission.goal(goal).map_err(|messages| first(&messages))?;
                 self.beliefs.mission.set_goal(condition);
                 self.beliefs.goal = Some(goal.clone());
+                self.beliefs.failures = None;
                 self.changes.goal = true;
                 self.changes.reasons.push("the goal has changed".to_owned());
                 Ok(())
@@ -306,14 +313,12 @@ impl BeliefUpdate<'_> {
         Ok(())
     }
 
-    fn failed(&mut self, action: u64) -> Result<(), Refusal> {
-        let step = self.ended_early(action)?.step;
-        // Only consecutive failures of one step count. Steps are compared without duration and cost, which depend on
-        // the situation.
+    /// Counts a failure of a step. Only consecutive failures of one step count. Steps are compared without duration and
+    /// cost, which depend on the situation.
+    fn count_failure(&mut self, step: PlannedStep) {
         let before = self.beliefs.failures.take().filter(|(failed, _)| failed.has_same_action(&step));
         let count = before.map_or(1, |(_, count)| count + 1);
         self.beliefs.failures = Some((step, count));
-        Ok(())
     }
 
     /// Ends an action without success. Resources consumed by its progress remain consumed, and its other effects do not

@@ -16,6 +16,7 @@ use crate::mapek::answer::Answer;
 use crate::mapek::ask::Outcome;
 use crate::mapek::control::Loop;
 use crate::mapek::event::{Event, Observation};
+use crate::mapek::live::Live;
 use crate::mapek::memo::StoredQuestion;
 use crate::mapek::plan::Prepared;
 
@@ -34,6 +35,7 @@ pub struct Thoughts {
     digest: String,
     answers: Vec<(StoredQuestion, Outcome)>,
     is_stopped: bool,
+    live: Live,
 }
 
 impl Thinker {
@@ -48,8 +50,8 @@ impl Thinker {
         self.control.planner.question_log = Some(Vec::new());
         self.control.deliberate();
         let answers = self.control.planner.question_log.take().unwrap_or_default();
-        let Loop { question, digest, .. } = self.control;
-        Thoughts { question, digest, answers, is_stopped: self.limits.reached() }
+        let Loop { question, digest, planner, .. } = self.control;
+        Thoughts { question, digest, answers, is_stopped: self.limits.reached(), live: planner.live }
     }
 }
 
@@ -149,6 +151,16 @@ impl Loop {
         !thoughts.is_stopped && thoughts.digest == self.digest
     }
 
+    /// Keeps the incremental planner of a search on another thread, so that the next search need not ground the mission
+    /// again. Its data depend on the mission only, so those of a cancelled search are kept, too. They take memory.
+    pub fn keep_planner(&mut self, thoughts: &Thoughts) {
+        if let Live::Ready(_) = &thoughts.live
+            && thoughts.digest == self.digest
+        {
+            self.planner.live = thoughts.live.clone();
+        }
+    }
+
     /// Returns `true` if an observation mentions an action or an effect whose number has not been used in a request
     /// yet.
     pub fn is_ahead(&self, observation: &Observation) -> bool {
@@ -230,7 +242,23 @@ mod tests {
     use crate::knowledge::Fault;
     use crate::mapek::control::Loop;
     use crate::mapek::event::Observation;
+    use crate::mapek::live::Live;
+    use crate::mapek::think::Thoughts;
     use crate::setup::Setup;
+
+    #[test]
+    fn the_planner_of_a_search_is_kept() {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
+        let Setup { mission, settings, .. } = Setup::read(&manifest).expect("the mission is read");
+        let mut control = Loop::new(mission, settings).expect("a loop");
+        let thoughts = control.thinker().think();
+        control.keep_planner(&thoughts);
+        assert!(matches!(control.planner.live, Live::Ready(_)));
+        // The planner may not have been built because the search was stopped.
+        let stopped = Thoughts { live: Live::Unsuited, ..control.thinker().think() };
+        control.keep_planner(&stopped);
+        assert!(matches!(control.planner.live, Live::Ready(_)));
+    }
 
     /// Otherwise, the same search would be repeated without end.
     #[test]

@@ -7,7 +7,7 @@ use metaplan::mapek::{Answer, Loop, Observation};
 use metaplan::setup::Setup;
 use num_rational::BigRational;
 
-use crate::common::{control, feed, kinds, own, plain};
+use crate::common::{control, crossroads, feed, kinds, own, plain};
 
 fn react(control: &mut Loop, line: &str) -> Vec<Answer> {
     let now = control.beliefs().now() + Duration::from_millis(100);
@@ -98,18 +98,6 @@ fn reported_values_are_exact_unless_they_are_long() {
     assert_eq!(control.beliefs().mission().value("battery"), Some(number(1_216_668, 1_000_000)));
 }
 
-const ROADS: &str = "(define (domain d) (:requirements :strips :typing) (:types place)
-  (:predicates (at ?p - place) (road ?a ?b - place))
-  (:action move :parameters (?a ?b - place) :precondition (and (at ?a) (road ?a ?b))
-    :effect (and (not (at ?a)) (at ?b))))";
-
-fn crossroads(roads: &str, goal: &str) -> Loop {
-    let problem = format!(
-        "(define (problem p) (:domain d) (:objects b c d - place) (:init (at b) {roads}) (:goal (at {goal})))"
-    );
-    plain(ROADS, &problem)
-}
-
 /// The goal is reachable only if the action under way, which leads into a dead end, is cancelled. Progress arrives
 /// during the search.
 #[test]
@@ -139,6 +127,91 @@ fn the_absence_of_a_plan_in_an_earlier_situation_is_not_used() {
     assert!(control.deliberate_with(thoughts, true).is_none());
     assert!(control.has_agenda());
     assert!(has(&control.deliberate(), "plan_found"));
+}
+
+/// Returns a loop whose first step, into a dead end, has failed twice. It is under way again as action 3.
+fn failed_twice() -> Loop {
+    let mut control = crossroads("(road b c) (road b d)", "c");
+    control.start();
+    for action in 1..=2 {
+        feed(&mut control, &ended("failed", action));
+    }
+    control
+}
+
+fn ended(outcome: &str, action: u64) -> String {
+    format!(r#"{{"event":"action_{outcome}","action":{action}}}"#)
+}
+
+#[test]
+fn the_end_of_a_cancelled_action_leads_to_a_plan_for_the_changes_before() {
+    let mut control = failed_twice();
+    let answers = feed(&mut control, r#"{"event":"goal_changed","goal":"(at d)"}"#);
+    assert_eq!(kinds(&answers), ["plan_requested", "cancel_action"]);
+    let answers = feed(&mut control, &ended("failed", 3));
+    assert_eq!(kinds(&answers), ["plan_requested", "plan_found", "request_action"], "{answers:?}");
+    // This action is cancelled because of its deadline, and the change is reported before its end.
+    let mut control = failed_twice();
+    feed(&mut control, &progress(3, "0.5"));
+    for time in [15, 30] {
+        feed(&mut control, &format!(r#"{{"event":"tick","time":{time}}}"#));
+    }
+    assert!(control.beliefs().cancelling());
+    assert_eq!(feed(&mut control, &fact("road d b", "true")), Vec::new());
+    let answers = feed(&mut control, &ended("failed", 3));
+    assert_eq!(kinds(&answers), ["plan_requested", "plan_found", "request_action"], "{answers:?}");
+}
+
+/// Otherwise, a robot that ends each action by itself would get requests without end.
+#[test]
+fn cancellations_that_the_loop_has_not_requested_count_as_failures() {
+    let mut control = crossroads("(road b c)", "c");
+    control.start();
+    for action in 1..=2 {
+        let answers = feed(&mut control, &ended("cancelled", action));
+        assert!(has(&answers, "request_action"), "{answers:?}");
+    }
+    let answers = feed(&mut control, &ended("cancelled", 3));
+    assert!(matches!(&answers[..], [Answer::PlanNone { status: "failed", .. }]), "{answers:?}");
+    // A robot that cannot suspend an action cancels it, before or after the resumption.
+    for is_resumed in [false, true] {
+        let mut control = crossroads("(road b c)", "c");
+        control.start();
+        for action in 1..=4 {
+            feed(&mut control, &fact("road b c", "false"));
+            assert!(control.beliefs().suspended());
+            if is_resumed {
+                assert!(has(&feed(&mut control, &fact("road b c", "true")), "resume_action"));
+            }
+            let answers = feed(&mut control, &ended("cancelled", action));
+            assert_eq!(has(&answers, "request_action"), is_resumed, "{answers:?}");
+            if !is_resumed {
+                assert!(has(&feed(&mut control, &fact("road b c", "true")), "request_action"));
+            }
+        }
+    }
+}
+
+/// The objective of the action that has ended is in error, and no longer so when the loop plans.
+#[test]
+fn an_objective_that_has_recovered_is_no_reason_to_plan() {
+    let mut ugv = control("ugv");
+    ugv.start();
+    react(&mut ugv, &ended("succeeded", 1));
+    for _ in 0..3 {
+        let answers = react(&mut ugv, &component("c_kinect", "FALSE"));
+        assert!(answers[0].to_json()["objectives"][0]["statuses"][0].is_string(), "{answers:?}");
+        react(&mut ugv, &component("c_kinect", "OK"));
+    }
+    let mut failing = ugv.clone();
+    assert_eq!(kinds(&ugv.deliberate()), ["request_action"]);
+    // An objective that is still in error is a reason, but only one.
+    react(&mut failing, &component("c_kinect", "FALSE"));
+    let answers = failing.deliberate();
+    let because = answers[0].to_json()["because"].clone();
+    let errors =
+        because.as_array().expect("reasons").iter().filter(|text| text.to_string().contains(" is IN_"));
+    assert_eq!(errors.count(), 1, "{because}");
 }
 
 /// The situation changes during each search. Otherwise, there would be neither a decision nor a pause between searches.

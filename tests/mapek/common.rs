@@ -33,6 +33,19 @@ pub fn plain(domain: &str, problem: &str) -> Loop {
     read(domain, problem, "[knowledge]\nfiles = []", "")
 }
 
+const ROADS: &str = "(define (domain d) (:requirements :strips :typing) (:types place)
+  (:predicates (at ?p - place) (road ?a ?b - place))
+  (:action move :parameters (?a ?b - place) :precondition (and (at ?a) (road ?a ?b))
+    :effect (and (not (at ?a)) (at ?b))))";
+
+/// Returns a loop, not started, for a robot at place b of the places b, c and d. It has no knowledge base.
+pub fn crossroads(roads: &str, goal: &str) -> Loop {
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects b c d - place) (:init (at b) {roads}) (:goal (at {goal})))"
+    );
+    plain(ROADS, &problem)
+}
+
 fn read(domain: &str, problem: &str, knowledge: &str, sections: &str) -> Loop {
     let directory = tempfile::tempdir().expect("a directory");
     for (name, text) in [("domain.pddl", domain), ("problem.pddl", problem)] {

@@ -262,7 +262,13 @@ fn a_segment_that_a_checkpoint_has_begun_is_not_needed() {
 #[test]
 fn a_restored_loop_knows_that_lines_have_times() {
     let pristine = control("ugv");
-    for (line, expected) in [(r#"{"event":"tick"}"#, false), (r#"{"event":"tick","time":3}"#, true)] {
+    for (line, expected) in [
+        (r#"{"event":"tick"}"#, false),
+        (r#"{"event":"tick","time":3}"#, true),
+        // The loop refuses these lines.
+        (r#"{"event":"tick","time":1764535144}"#, false),
+        (r#"{"event":"tikc","time":3}"#, false),
+    ] {
         let mut control = pristine.clone();
         assert!(!control.beliefs().has_times());
         crate::common::feed(&mut control, line);

@@ -291,6 +291,9 @@ fn the_configuration_loop_reacts_when_a_report_becomes_due() {
     let mut program = Program::start(directory.path(), &options);
     program.lines.recv().expect("a line");
     program.answers();
+    // A refused line does not replace the clock by its time.
+    program.send(r#"{"event":"tick","time":1764535144}"#);
+    program.answers();
     let failed = r#"{"event":"component_status","component":"c_arm","status":"FALSE"}"#;
     let sent = Instant::now();
     program.send(failed);
@@ -302,12 +305,12 @@ fn the_configuration_loop_reacts_when_a_report_becomes_due() {
     let change = std::iter::repeat_with(&mut timed).find(|answer| answer["answer"] == "reconfigure");
     let change = change.expect("a design");
     assert!(sent.elapsed() >= Duration::from_millis(450), "{:?}", sent.elapsed());
-    assert_eq!((&change["to"], &change["line"]), (&json!("fd_look_far"), &json!(1)));
+    assert_eq!((&change["to"], &change["line"]), (&json!("fd_look_far"), &json!(2)));
     program.kill();
     // The journal contains the timer.
     let program = Program::start(directory.path(), &options);
     let ready = program.lines.recv().expect("a line");
-    assert_eq!((&ready["resumed"], &ready["lines"]), (&json!(true), &json!(1)));
+    assert_eq!((&ready["resumed"], &ready["lines"]), (&json!(true), &json!(2)));
     let answers = program.answers();
     assert_eq!(answers.len(), 1, "{answers:?}");
     assert_eq!((&answers[0]["to"], &answers[0]["repeated"]), (&json!("fd_look_far"), &json!(true)));

@@ -9,7 +9,7 @@ use cpu_time::ThreadTime;
 use metaplan::mapek::{Answer, Command, Loop, Observation, ParallelSearch, SafeReaction, Settings};
 use metaplan::setup::Setup;
 
-use crate::common::{control, feed, kinds, own};
+use crate::common::{control, crossroads, feed, kinds, own};
 
 fn with(settings: impl Fn(Settings) -> Settings) -> Loop {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
@@ -357,6 +357,35 @@ fn missed_deadlines_have_the_documented_outcomes() {
     let report_count: usize = (1..2000).map(|time| overdue(&feed(&mut silent, &tick(time * 60))).len()).sum();
     assert!((2..20).contains(&report_count), "{report_count}");
     assert!(!silent.beliefs().cancelling());
+}
+
+/// The report of the end can be lost, also if the robot has acknowledged the cancellation.
+#[test]
+fn an_acknowledged_cancellation_is_repeated_until_the_action_ends() {
+    let mut control = crossroads("(road b c) (road b d)", "c");
+    let mut restored = control.clone();
+    control.start();
+    feed(&mut control, r#"{"event":"acknowledged","effect":1}"#);
+    let answers = feed(&mut control, r#"{"event":"goal_changed","goal":"(at d)"}"#);
+    assert_eq!(kinds(&answers), ["plan_requested", "cancel_action"]);
+    feed(&mut control, r#"{"event":"acknowledged","effect":2,"time":5}"#);
+    restored.restore(&control.snapshot()).expect("the snapshot fits");
+    for control in [&mut control, &mut restored] {
+        let mut times = Vec::new();
+        for time in 6..=60 {
+            // A second acknowledgement does not begin another deadline.
+            let event = if time % 7 == 0 { r#""acknowledged","effect":2"# } else { r#""tick""# };
+            let answers = feed(control, &format!(r#"{{"event":{event},"time":{time}}}"#));
+            if !answers.is_empty() {
+                assert_eq!(kinds(&answers), ["overdue", "cancel_action"]);
+                times.push(time);
+            }
+        }
+        assert_eq!(times, [15, 25, 35, 55]);
+        let answers = feed(control, r#"{"event":"action_cancelled","action":1}"#);
+        assert!(kinds(&answers).contains(&"request_action".to_owned()), "{answers:?}");
+        assert_eq!(control.beliefs().outstanding().map(|effect| effect.number).collect::<Vec<_>>(), [3]);
+    }
 }
 
 #[test]
