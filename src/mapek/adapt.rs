@@ -66,10 +66,14 @@ impl Adaptation<'_> {
     }
 
     fn decide(&mut self, mut changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
-        self.record_improvement_causes(&findings, &changes);
-        // Lost designs do not count: with fewer alternatives, a missing plan stays missing.
-        let is_change =
-            changes.facts || changes.ended || !changes.reasons.is_empty() || !findings.gained.is_empty();
+        // Usually, lost designs do not count: with fewer alternatives, a missing plan stays missing.
+        let may_gain = !findings.lost.is_empty() && self.beliefs.mission.may_gain_by_loss();
+        self.record_improvement_causes(&findings, &changes, may_gain);
+        let is_change = changes.facts
+            || changes.ended
+            || may_gain
+            || !changes.reasons.is_empty()
+            || !findings.gained.is_empty();
         if self.stop_after_failures(&changes, &findings, answers) {
             return;
         }
@@ -155,12 +159,13 @@ impl Adaptation<'_> {
         true
     }
 
-    fn record_improvement_causes(&mut self, findings: &Findings, changes: &Changes) {
+    fn record_improvement_causes(&mut self, findings: &Findings, changes: &Changes, may_gain: bool) {
         let improvement_causes = &mut self.beliefs.improvement_causes;
         improvement_causes.retain(|design| !findings.lost.contains(design));
         let before = improvement_causes.len();
         improvement_causes.extend(findings.gained.iter().cloned());
-        improvement_causes.extend((changes.predicates || changes.values).then(|| FACTS.to_owned()));
+        let is_change = changes.predicates || changes.values || may_gain;
+        improvement_causes.extend(is_change.then(|| FACTS.to_owned()));
         // A plan that is not proved optimal may be improved: a changed situation may be easier to search.
         let is_news = changes.facts || !findings.gained.is_empty() || !findings.lost.is_empty();
         improvement_causes.extend((is_news && self.beliefs.unproved).then(|| FACTS.to_owned()));

@@ -16,7 +16,7 @@ pub(super) struct Changes {
     /// Whether a report has changed facts of the problem or a design of the action under way, and not only values.
     pub(super) predicates: bool,
     pub(super) goal: bool,
-    /// Whether reported values of the problem differ from the believed ones.
+    /// Whether a report has changed values of the problem, or other inputs of planning in the knowledge base.
     pub(super) values: bool,
     pub(super) ended: bool,
     /// Number of observations after which the next deliberation may need a plan.

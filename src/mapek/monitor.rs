@@ -4,7 +4,8 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use num_rational::BigRational;
 use ontology::vocab::local_name;
-use pddl::validate::{Advance, ValueChange, advance};
+use pddl::ast::{Domain, Problem};
+use pddl::validate::{Advance, ValueChange, Violation, advance, advance_defined};
 use rules::{Delta, Fact};
 
 use crate::knowledge::{RobotReport, VALUE_PROPERTIES};
@@ -100,7 +101,10 @@ impl BeliefUpdate<'_> {
             Event::Started { action } => self.confirm_started(*action).map(|_| ()),
             Event::Progress { action, fraction } => {
                 self.confirm_started(*action)?.progressed = true;
-                self.progress(fraction);
+                // Without a result, a later report applies this share, too.
+                if let Some(Ok(advance)) = self.evaluate(forced) {
+                    self.progress(fraction, &advance);
+                }
                 Ok(())
             }
             Event::Succeeded { action } => self.succeeded(*action),
@@ -202,6 +206,8 @@ impl BeliefUpdate<'_> {
             for function in functions {
                 if self.beliefs.mission.value(&function).is_some() {
                     self.fact(&function, &number::decimal(value))?;
+                } else {
+                    self.changes.values |= is_change;
                 }
             }
             return Ok(());
@@ -244,17 +250,21 @@ impl BeliefUpdate<'_> {
         let delete = delta.delete.iter().map(|fact| (fact, false));
         for (fact, is_insertion) in insert.chain(delete) {
             let name = name(fact);
+            let mut is_input = false;
             // The analysis determines whether plans depend on a change of these properties.
             if WATCHED.contains(&name) {
                 self.changes.base = Base::Watched;
             } else {
-                self.changes.facts |= PLANNED.contains(&name) || self.beliefs.mission.contains_fact(fact);
+                is_input = PLANNED.contains(&name) || self.beliefs.mission.contains_fact(fact);
             }
             if VALUE_PROPERTIES.contains(&name) {
                 // A derived value is an estimation, which plans depend on. A reported value is a measurement.
-                self.changes.facts |=
-                    if is_insertion { !engine.is_asserted(fact) } else { !replaced.contains(&subject(fact)) };
+                is_input |= is_insertion && !engine.is_asserted(fact);
+                // A value that ceases to hold may have been either.
+                self.changes.facts |= !is_insertion && !replaced.contains(&subject(fact));
             }
+            self.changes.facts |= is_input;
+            self.changes.values |= is_input;
         }
     }
 
@@ -291,9 +301,20 @@ impl BeliefUpdate<'_> {
     fn succeeded(&mut self, action: u64) -> Result<(), Refusal> {
         let request = self.running(action)?.request;
         self.beliefs.confirm_request(request);
-        // Completes the remaining increases and decreases. The report of success counts even if conditions are
-        // violated.
-        let advance = self.progress(&BigRational::from_integer(1.into()));
+        // The report of success counts even if conditions are violated, or if effects cannot be evaluated.
+        let advance = match self.evaluate(forced) {
+            Some(Err(violation)) => {
+                let text = format!("the effects of action {action} are uncertain: {}", violation.message);
+                self.changes.reasons.push(text);
+                self.evaluate(defined)
+            }
+            outcome => outcome,
+        };
+        let advance = advance.and_then(Result::ok);
+        // Completes the remaining increases and decreases.
+        if let Some(advance) = &advance {
+            self.progress(&BigRational::from_integer(1.into()), advance);
+        }
         let running = self.end(action)?;
         if let Some(mut advance) = advance {
             // Gradual changes were applied with the progress.
@@ -302,6 +323,7 @@ impl BeliefUpdate<'_> {
             let mut init = self.beliefs.mission.problem().init.clone();
             advance.apply(&mut init);
             self.beliefs.mission.set_init(init);
+            self.assert_effects(action, &advance);
         }
         self.beliefs.failures = None;
         if running.cancelling || running.suspended {
@@ -330,43 +352,53 @@ impl BeliefUpdate<'_> {
     }
 
     /// Sets the progress of the action under way, and applies the share of its increases and decreases since the
-    /// previous progress. Returns the effects of the whole action.
-    fn progress(&mut self, fraction: &BigRational) -> Option<Advance> {
-        let advance = self.advance();
-        let running = self.beliefs.running.as_mut()?;
+    /// previous progress. `advance` contains the effects of the whole action.
+    fn progress(&mut self, fraction: &BigRational, advance: &Advance) {
+        let Some(running) = &mut self.beliefs.running else { return };
         let increment = fraction - &running.progress;
         running.progress.clone_from(fraction);
         let gradual = gradual_functions(self.beliefs.mission.domain(), &running.step);
         let is_gradual = |change: &&ValueChange| gradual.contains(&change.function.predicate.name);
-        for change in advance.iter().flat_map(|advance| &advance.values).filter(is_gradual) {
+        for change in advance.values.iter().filter(is_gradual) {
             let name = change.text.trim_matches(['(', ')']);
-            if let (Some(now), Some(before)) = (self.beliefs.mission.value(name), &change.before) {
+            if let Some(before) = &change.before {
+                // A value that the problem does not state comes from the knowledge base. From now on, the problem
+                // states it.
+                let now = self.beliefs.mission.value(name).unwrap_or_else(|| before.clone());
                 // The value is exact, so that the end of the action has the effects that were planned.
                 let value = number::bounded(&now + (&change.after - before) * &increment);
                 self.beliefs.mission.set_number(name, &value);
-                if let Some(running) = &mut self.beliefs.running {
-                    *running.applied.entry(name.to_owned()).or_default() += value - now;
-                }
+                *running.applied.entry(name.to_owned()).or_default() += value - now;
             }
         }
-        advance
     }
 
-    /// Returns the effects of a complete execution of the action under way, regardless of its conditions. They are those
-    /// in the state before the action: without the increases and decreases by its progress.
-    fn advance(&mut self) -> Option<Advance> {
+    /// Applies the facts that an action has added and deleted to the knowledge base.
+    fn assert_effects(&mut self, action: u64, advance: &Advance) {
+        match self.beliefs.mission.assert_effects(&advance.added, &advance.deleted) {
+            Ok(delta) if delta == Delta::default() => {}
+            Ok(_) => self.changes.base = Base::Watched,
+            Err(message) => {
+                let text = format!("the effects of action {action} are uncertain: {}", message.message);
+                self.changes.reasons.push(text);
+            }
+        }
+    }
+
+    /// Evaluates the effects of a complete execution of the action under way. They are those in the state before the
+    /// action: without the increases and decreases by its progress.
+    fn evaluate<T>(&mut self, effects: impl Fn(&Domain, &Problem, &PlannedStep) -> T) -> Option<T> {
         let Beliefs { mission, running, .. } = &mut *self.beliefs;
         let running = running.as_ref()?;
-        let step = running.step.to_plan_step();
         if running.applied.is_empty() {
-            return advance(mission.domain(), &mission.current(), &step, true).ok();
+            return Some(effects(mission.domain(), &mission.current(), &running.step));
         }
         // The caller changes the values of the mission, so that the cached problem becomes outdated anyway.
         let mut before = mission.take_current();
         for (name, change) in &running.applied {
             Mission::add_to_value(&mut before, name, &-change);
         }
-        advance(mission.domain(), &before, &step, true).ok()
+        Some(effects(mission.domain(), &before, &running.step))
     }
 
     fn fact(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
@@ -419,6 +451,18 @@ impl BeliefUpdate<'_> {
         }
         Ok(is_change)
     }
+}
+
+type Effects = Result<Advance, Box<Violation>>;
+
+/// Effects of a step, regardless of its conditions.
+fn forced(domain: &Domain, problem: &Problem, step: &PlannedStep) -> Effects {
+    advance(domain, problem, &step.to_plan_step(), true)
+}
+
+/// Effects of a step that can be evaluated, with the planned duration.
+fn defined(domain: &Domain, problem: &Problem, step: &PlannedStep) -> Effects {
+    advance_defined(domain, problem, &step.to_plan_step(), &step.duration)
 }
 
 fn fault(message: &Message) -> Refusal {

@@ -1,11 +1,13 @@
 //! Tests of changes between two decisions: exact values after progress, plans of another thread after progress,
-//! designs that only conditions read, reports that arrive together with a failure, and facts that rules infer.
+//! designs that only conditions read, reports that arrive together with a failure, facts that rules infer, and effects
+//! of actions on the knowledge base.
 
 use std::time::Duration;
 
 use metaplan::mapek::{Answer, Loop, Observation};
 use metaplan::setup::Setup;
 use num_rational::BigRational;
+use pddl::ast::{InitialElement, Name};
 
 use crate::common::{control, crossroads, feed, kinds, own, plain};
 
@@ -321,8 +323,12 @@ const KNOWLEDGE: &str = "@prefix : <http://example.org/m#> .
 @prefix t: <http://metacontrol.org/tomasys#> .
 <http://example.org/m> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .
 :OpenPlace a owl:Class . :ClosedPlace a owl:Class . :wp5 a :ClosedPlace .
-:light a t:QualityAttributeType .
+:light a t:QualityAttributeType . :battery a t:QualityAttributeType .
 :obs_light a t:QAvalue ; t:isQAtype :light ; t:isMeasured true ; t:hasValue 0.5 .
+:obs_battery a t:QAvalue ; t:isQAtype :battery ; t:isMeasured true ; t:hasValue 100.0 .
+:robotAt a owl:ObjectProperty . :road a owl:ObjectProperty .
+:r a owl:NamedIndividual ; :robotAt :wp6 .
+:wp6 a owl:NamedIndividual ; :road :wp5 . :wp5 :road :wp6 .
 ";
 
 const RULES: &str = "@prefix : <http://example.org/m#> .
@@ -347,7 +353,7 @@ fn lighted(domain: &str, problem: &str, bindings: &str) -> Loop {
 }
 
 fn light(value: &str) -> String {
-    format!(r#"{{"event":"measured","attribute":"light","value":{value}}}"#)
+    measured("light", value)
 }
 
 /// Returns a loop, not started, in which a rule infers the only object that can be visited.
@@ -400,4 +406,200 @@ fn a_reported_fact_is_checked_in_the_present_situation() {
         assert!(!is_refused(control, "visited wp5", "false"));
         assert!(is_refused(control, "visited wp5", "true"));
     }
+}
+
+fn succeeded(action: u64) -> String {
+    format!(r#"{{"event":"action_succeeded","action":{action}}}"#)
+}
+
+fn measured(attribute: &str, value: &str) -> String {
+    format!(r#"{{"event":"measured","attribute":"{attribute}","value":{value}}}"#)
+}
+
+fn planned(control: &Loop) -> Vec<String> {
+    control.beliefs().plan().into_iter().flatten().map(|step| step.action.clone()).collect()
+}
+
+/// The values are those that follow from the definition: each move takes 10 s and 20 units of energy at the speed 1.
+#[test]
+fn a_success_counts_although_its_effects_cannot_be_evaluated() {
+    let domain = "(define (domain d) (:requirements :strips :typing :fluents :durative-actions) (:types place)
+      (:predicates (at ?p - place)) (:functions (speed) (battery) (distance ?a ?b - place))
+      (:durative-action move :parameters (?a ?b - place) :duration (= ?duration (/ (distance ?a ?b) (speed)))
+        :condition (at start (at ?a))
+        :effect (and (at start (not (at ?a))) (at end (at ?b)) (at end (decrease (battery) (* 2 ?duration))))))";
+    let problem = "(define (problem p) (:domain d) (:objects wp1 wp2 wp3 - place)
+      (:init (at wp1) (= (speed) 1) (= (battery) 100) (= (distance wp1 wp2) 10) (= (distance wp2 wp3) 10))
+      (:goal (at wp3)))";
+    let started = || {
+        let mut control = plain(domain, problem);
+        control.start();
+        control
+    };
+    let battery = |control: &Loop| control.beliefs().mission().value("battery").expect("a value");
+
+    let mut control = started();
+    feed(&mut control, &progress(1, "0.9"));
+    let answers = feed(&mut control, &measured("speed", "0"));
+    assert!(has(&answers, "suspend_action"), "{answers:?}");
+    let answers = feed(&mut control, &succeeded(1));
+    let reasons = answers.iter().map(|answer| answer.to_json().to_string()).collect::<String>();
+    assert!(reasons.contains("the effects of action 1 are uncertain: "), "{reasons}");
+    let mission = control.beliefs().mission();
+    assert!(mission.holds("at wp2") && !mission.holds("at wp1"), "{answers:?}");
+    assert_eq!(battery(&control), number(80, 1));
+    let answers = feed(&mut control, &measured("speed", "1"));
+    assert!(has(&answers, "request_action"), "{answers:?}");
+    let (_, step) = control.beliefs().running().expect("an action");
+    assert_eq!(step.arguments, ["wp2", "wp3"]);
+
+    // A share of the effects that cannot be evaluated is applied later.
+    let mut control = started();
+    for (line, expected) in [
+        (progress(1, "0.5"), 90),
+        (measured("speed", "0"), 90),
+        (progress(1, "0.9"), 90),
+        (measured("speed", "1"), 90),
+        (progress(1, "0.9"), 82),
+        (succeeded(1), 80),
+    ] {
+        feed(&mut control, &line);
+        assert_eq!(battery(&control), number(expected, 1), "{line}");
+    }
+}
+
+#[test]
+fn effects_are_those_of_the_schema_that_could_start() {
+    let domain = "(define (domain d) (:requirements :strips :fluents)
+      (:predicates (on_table ?x) (on_floor ?x) (holding ?x)) (:functions (battery))
+      (:action take :parameters (?x) :precondition (on_table ?x) :effect (and (holding ?x) (not (on_table ?x))))
+      (:action take :parameters (?x) :precondition (on_floor ?x)
+        :effect (and (holding ?x) (not (on_floor ?x)) (decrease (battery) 5))))";
+    let problem = "(define (problem p) (:domain d) (:objects b) (:init (on_floor b) (= (battery) 9))
+      (:goal (holding b)))";
+    let mut control = plain(domain, problem);
+    control.start();
+    let answers = feed(&mut control, &succeeded(1));
+    assert!(answers.contains(&Answer::GoalReached), "{answers:?}");
+    let mission = control.beliefs().mission();
+    assert!(mission.holds("holding b") && !mission.holds("on_floor b"));
+    assert_eq!(mission.value("battery"), Some(number(4, 1)));
+}
+
+/// The value of the battery is measured, and not stated by the problem. Each move uses 40 of 100 units.
+#[test]
+fn actions_change_a_value_of_the_knowledge_base() {
+    let domain = "(define (domain d) (:requirements :strips :typing :fluents) (:types place)
+      (:predicates (at ?p - place) (way ?a ?b - place)) (:functions (battery))
+      (:action move :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b) (>= (battery) 40))
+        :effect (and (not (at ?a)) (at ?b) (decrease (battery) 40))))";
+    let problem = "(define (problem p) (:domain d) (:objects a b c - place)
+      (:init (at a) (way a b) (way b c) (way b a) (way c b)) (:goal (at c)))";
+    for has_progress in [false, true] {
+        let mut control = lighted(domain, problem, "");
+        control.start();
+        if has_progress {
+            feed(&mut control, &progress(1, "0.5"));
+            assert_eq!(control.beliefs().mission().value("battery"), Some(number(80, 1)));
+        }
+        feed(&mut control, &succeeded(1));
+        let answers = feed(&mut control, &succeeded(2));
+        assert!(answers.contains(&Answer::GoalReached), "{answers:?}");
+        assert_eq!(control.beliefs().mission().value("battery"), Some(number(20, 1)));
+        let answers = feed(&mut control, r#"{"event":"goal_changed","goal":"(at a)"}"#);
+        assert!(has(&answers, "plan_none"), "{answers:?}");
+        let answers = feed(&mut control, &measured("battery", "90"));
+        assert!(has(&answers, "request_action"), "{answers:?}");
+        assert_eq!(control.beliefs().mission().value("battery"), Some(number(90, 1)));
+    }
+}
+
+/// In PLANTA's form, the knowledge base states where the robot is, and a value.
+#[test]
+fn actions_change_facts_of_the_knowledge_base() {
+    let domain = "(define (domain d) (:requirements :strips :typing) (:predicates (done))
+      (:action move :parameters (?a ?b) :precondition (and (robotAt r ?a) (road ?a ?b))
+        :effect (and (not (robotAt r ?a)) (robotAt r ?b)))
+      (:action brighten :parameters () :precondition (robotAt r wp5) :effect (hasValue obs_light 0.9_decimal))
+      (:action work :parameters () :precondition (and (robotAt r wp6) (hasValue obs_light 0.9_decimal))
+        :effect (done)))";
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done)))";
+    let mut control = lighted(domain, problem, "");
+    control.start();
+    let facts = |control: &Loop| -> Vec<String> {
+        let problem = control.beliefs().mission().current();
+        let facts = problem.init.iter().filter_map(InitialElement::fact);
+        let facts = facts.filter(|(name, _)| [Name::new("robotAt"), Name::new("hasValue")].contains(name));
+        let facts = facts.map(|(_, arguments)| format!("{} {}", arguments[0], arguments[1]));
+        let mut facts: Vec<String> = facts.filter(|fact| !fact.starts_with("obs_battery")).collect();
+        facts.sort();
+        facts
+    };
+    let expected = [
+        ("move", ["obs_light 0.5_decimal", "r wp6"]),
+        ("brighten", ["obs_light 0.5_decimal", "r wp5"]),
+        ("move", ["obs_light 0.9_decimal", "r wp5"]),
+        ("work", ["obs_light 0.9_decimal", "r wp6"]),
+    ];
+    for (action, (name, situation)) in (1..).zip(expected) {
+        assert_eq!(facts(&control), situation, "{action}");
+        let (_, step) = control.beliefs().running().expect("an action");
+        assert_eq!(step.action, name);
+        let mut restored = lighted(domain, problem, "");
+        restored.restore(&control.snapshot()).expect("the snapshot fits");
+        assert_eq!(facts(&restored), situation, "{action}");
+        feed(&mut control, &succeeded(action));
+    }
+    assert!(control.beliefs().reached());
+    // A measurement replaces the believed value.
+    feed(&mut control, &light("0.5"));
+    assert_eq!(facts(&control), ["obs_light 0.5_decimal", "r wp6"]);
+}
+
+#[test]
+fn inferred_facts_and_measured_values_lead_to_a_better_plan() {
+    let steps = "(:action first :parameters () :precondition (and) :effect (a))
+      (:action second :parameters () :precondition (a) :effect (b))
+      (:action third :parameters () :precondition (b) :effect (done))";
+    let inferred = format!(
+        "(define (domain d) (:requirements :strips :typing) (:types open) (:predicates (a) (b) (done))
+          {steps} (:action through :parameters (?p - open) :precondition (and) :effect (done)))"
+    );
+    let value = format!(
+        "(define (domain d) (:requirements :strips :fluents) (:predicates (a) (b) (done)) (:functions (light))
+          {steps} (:action through :parameters () :precondition (>= (light) 0.8) :effect (done)))"
+    );
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done)))";
+    for (domain, bindings) in [(inferred, "[bindings]\nopen = 'class:OpenPlace'"), (value, "")] {
+        let mut control = lighted(&domain, problem, bindings);
+        control.start();
+        assert_eq!(planned(&control), ["second", "third"]);
+        let answers = feed(&mut control, &light("0.9"));
+        assert!(has(&answers, "plan_found"), "{answers:?}");
+        assert_eq!(planned(&control), ["through"]);
+    }
+}
+
+/// A condition requires that a design is not available.
+#[test]
+fn the_loss_of_a_design_can_lead_to_a_plan() {
+    let domain = "(define (domain d) (:requirements :strips :typing :negative-preconditions)
+      (:types function functiondesign) (:constants fd_amcl_kinect - functiondesign)
+      (:predicates (a) (b) (done) (started) (fd_available ?d - functiondesign))
+      (:action first :parameters () :precondition (started) :effect (a))
+      (:action second :parameters () :precondition (a) :effect (b))
+      (:action third :parameters () :precondition (b) :effect (done))
+      (:action replace :parameters () :precondition (not (fd_available fd_amcl_kinect)) :effect (done)))";
+    let problem = |init: &str| format!("(define (problem p) (:domain d) (:init {init}) (:goal (done)))");
+    let mut control = own(domain, &problem(""), "[adaptation]\nsettle = 0");
+    let answers = control.start();
+    assert!(has(&answers, "plan_none"), "{answers:?}");
+    let answers = feed(&mut control, &component("c_kinect", "FALSE"));
+    assert!(has(&answers, "request_action"), "{answers:?}");
+
+    let mut control = own(domain, &problem("(started)"), "[adaptation]\nsettle = 0");
+    control.start();
+    assert_eq!(planned(&control), ["second", "third"]);
+    feed(&mut control, &component("c_kinect", "FALSE"));
+    assert_eq!(planned(&control), ["replace"]);
 }

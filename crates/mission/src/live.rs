@@ -8,8 +8,9 @@ use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
 use ontology::vocab::local_name;
 use pddl::ast::{Atom, Condition, Declaration, Domain, InitialElement, Name, Problem, Term};
+use pddl::visit::Node;
 use pddl::{self, Severity, Source};
-use rules::Fact;
+use rules::{Delta, Fact};
 
 use crate::binding;
 use crate::joined::Mission;
@@ -238,6 +239,41 @@ impl Mission {
         self.adaptation.as_ref().map(|adaptation| adaptation.functions_of(action)).unwrap_or_default()
     }
 
+    /// Applies the facts that an action has added and deleted to the assertions from which a problem in PLANTA's form is
+    /// filled. Otherwise, [`Mission::fill`] would restore deleted facts and replaced values. Other missions are
+    /// unchanged. Returns the change of all facts of the knowledge base.
+    ///
+    /// # Errors
+    /// Inference exceeds its limits; the knowledge base is then unchanged.
+    pub fn assert_effects(&mut self, added: &[Atom], deleted: &[Atom]) -> Result<Delta, Message> {
+        self.forget();
+        let (Some(planta), Some(knowledge)) = (&self.planta, &mut self.knowledge) else {
+            return Ok(Delta::default());
+        };
+        if !added.iter().chain(deleted).any(|atom| planta.known().contains(&atom.predicate.name)) {
+            return Ok(Delta::default());
+        }
+        knowledge.change_assertions(|stated, engine| planta.effects(stated, engine, (added, deleted)))
+    }
+
+    /// Returns `true` if the loss of designs may make plans possible or better: a condition, an axiom or the goal reads
+    /// the availability of designs in another way than as a positive fact. In PLANTA's form, axioms decide on the
+    /// availability, and the facts that they read are reported as changes of the problem.
+    pub fn may_gain_by_loss(&self) -> bool {
+        if self.planta.is_some() {
+            return false;
+        }
+        let is_availability = |atom: &Atom| self.bindings.is_availability(&atom.predicate.name);
+        let domain = self.domain();
+        let mut mentions = 0;
+        let mut count = |node: Node<'_>| mentions += usize::from(node.atom().is_some_and(is_availability));
+        domain.walk(&mut count);
+        self.problem.walk(&mut count);
+        let conditions = domain.actions.iter().flat_map(|action| action.body.conditions());
+        let required = conditions.chain([&self.problem.goal]);
+        mentions > required.map(|condition| positive_atoms(condition, &is_availability)).sum()
+    }
+
     /// Replaces the initial state of the problem.
     pub fn set_init(&mut self, init: Vec<InitialElement>) {
         self.forget();
@@ -297,6 +333,15 @@ impl Mission {
             })
         });
         designs.chain(problem_designs.map(ToString::to_string)).collect()
+    }
+}
+
+/// Number of the wanted atoms of a condition that are not in a negation or implication.
+fn positive_atoms(condition: &Condition, is_wanted: &dyn Fn(&Atom) -> bool) -> usize {
+    match condition {
+        Condition::Atom(atom) => usize::from(is_wanted(atom)),
+        Condition::Not(_) | Condition::Imply(..) => 0,
+        _ => condition.parts().map(|part| positive_atoms(part, is_wanted)).sum(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Tests of the definition of a plan (`validate/definition.md`), with plans on both sides of the boundaries of
 //! its rules.
 
-use metaplan_pddl::validate::{Options, PlanStep, PlanText, advance, validate};
+use metaplan_pddl::validate::{Advance, Options, PlanStep, PlanText, advance, advance_defined, validate};
 use metaplan_pddl::{Source, read};
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -406,6 +406,13 @@ fn a_fixed_duration_must_satisfy_the_other_constraints() {
     }
 }
 
+fn changed_facts(advance: &Advance) -> String {
+    let names = |atoms: &[metaplan_pddl::ast::Atom]| {
+        atoms.iter().map(|atom| atom.predicate.name.to_string()).collect::<Vec<_>>().join(" ")
+    };
+    format!("+{} -{}", names(&advance.added), names(&advance.deleted))
+}
+
 #[test]
 fn a_single_step_has_the_same_effects_as_in_a_plan() {
     let single = |duration: &str, condition: &str, effect: &str, forced: bool| {
@@ -413,12 +420,7 @@ fn a_single_step_has_the_same_effects_as_in_a_plan() {
         let plan = PlanText::parse(&Source::new("plan", "(a)")).expect("the plan can be read");
         let step: &PlanStep = &plan.steps[0];
         match advance(&domain, &problem, step, forced) {
-            Ok(after) => {
-                let names = |atoms: &[metaplan_pddl::ast::Atom]| {
-                    atoms.iter().map(|atom| atom.predicate.name.to_string()).collect::<Vec<_>>().join(" ")
-                };
-                format!("+{} -{}", names(&after.added), names(&after.deleted))
-            }
+            Ok(after) => changed_facts(&after),
             Err(violation) => violation.kind.as_str().to_owned(),
         }
     };
@@ -433,6 +435,40 @@ fn a_single_step_has_the_same_effects_as_in_a_plan() {
     ] {
         assert_eq!(single(duration, condition, effect, forced), expected, "{duration} {condition} {effect}");
     }
+}
+
+#[test]
+fn a_forced_step_is_an_instance_of_the_first_schema_that_can_start() {
+    let take = |place: &str, effect: &str| {
+        format!(
+            "(:action take :parameters () :precondition ({place}) :effect (and (not ({place})) {effect}))\n"
+        )
+    };
+    let actions = [take("p", "(r)"), take("q", "(g) (increase (y) 5)")];
+    let plan = PlanText::parse(&Source::new("plan", "(take)")).expect("the plan can be read");
+    // If no schema can start, the first one counts.
+    for (init, expected, count) in [("(p)", "+r -p", 0), ("(q)", "+g -q", 1), ("", "+r -", 0)] {
+        let (domain, problem) = task(&actions, init, "").parse();
+        let after = advance(&domain, &problem, &plan.steps[0], true).expect("a schema fits");
+        assert_eq!((changed_facts(&after).as_str(), after.values.len()), (expected, count), "{init}");
+    }
+}
+
+#[test]
+fn effects_that_cannot_be_evaluated_are_left_out() {
+    // The divisor `y` is 0, and `z` has no value.
+    let effect =
+        "(at start (not (r))) (at end (g)) (at end (increase (x) ?duration)) (at end (increase (z) 1))
+        (at end (assign (y) (/ 1 (y)))) (when (at end (> (/ 1 (y)) 1)) (at end (p)))";
+    let (domain, problem) = task(&[durative("a", "(/ 6 (y))", "", effect)], "(r)", "").parse();
+    let plan = PlanText::parse(&Source::new("plan", "(a)")).expect("the plan can be read");
+    let violation = advance(&domain, &problem, &plan.steps[0], true).expect_err("no duration");
+    assert_eq!(violation.kind.as_str(), "undefined");
+    let number = |value: i32| BigRational::from_integer(BigInt::from(value));
+    let after = advance_defined(&domain, &problem, &plan.steps[0], &number(3)).expect("an action");
+    assert_eq!(changed_facts(&after), "+g -r");
+    let values: Vec<_> = after.values.iter().map(|change| (change.text.as_str(), &change.after)).collect();
+    assert_eq!(values, [("(x)", &number(5))]);
 }
 
 #[test]

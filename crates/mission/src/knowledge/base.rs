@@ -471,6 +471,23 @@ impl Knowledge {
         self.changed(outcome).map(|_| ())
     }
 
+    /// Applies the change of assertions that `change` returns for the present assertions. Returns the change of all facts.
+    ///
+    /// # Errors
+    /// Inference exceeds its limits; the knowledge is then unchanged.
+    pub(crate) fn change_assertions(
+        &mut self,
+        change: impl FnOnce(&[Fact], &mut Engine) -> Delta,
+    ) -> Result<Delta, Message> {
+        let stated = self.stated();
+        let delta = change(&stated, self.runtime.engine_mut());
+        if delta == Delta::default() {
+            return Ok(delta);
+        }
+        let outcome = self.runtime.apply(delta);
+        self.changed(outcome)
+    }
+
     /// Adds the assertions, axioms and rules of the documents in `asserted` and removes those of
     /// the documents in `retracted`, except declarations. Reports of the robot stay. A statement that
     /// occurs in both lists is kept. Imports of these documents are not followed. Returns the

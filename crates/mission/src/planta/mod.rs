@@ -24,10 +24,10 @@ use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 
 use ontology::Ontology;
-use pddl::ast::{Condition, Domain, InitialElement, Name, Problem, Span, Term};
+use pddl::ast::{Atom, Condition, Domain, InitialElement, Name, Problem, Span, Term};
 use pddl::validate::{Options, PlanText, ViolationKind, validate};
 use pddl::{Mentioned, Source};
-use rules::{Engine, Fact, Literal, Value};
+use rules::{Delta, Engine, Fact, Literal, Value};
 
 use crate::message::{Message, did_you_mean};
 use crate::withdraw::withdraw;
@@ -153,6 +153,40 @@ impl Planta {
             InitialElement::Fact(atom(predicate.clone(), arguments.collect()))
         }));
         messages
+    }
+
+    /// Returns the change of the assertions `stated` by an action that adds and deletes facts. Deleted facts are not
+    /// asserted any more. An added value of a functional data property replaces the asserted value.
+    pub(crate) fn effects(
+        &self,
+        stated: &[Fact],
+        engine: &mut Engine,
+        (added, deleted): (&[Atom], &[Atom]),
+    ) -> Delta {
+        let mut delta = Delta::default();
+        for fact in stated {
+            let Some((predicate, arguments)) = self.fact(fact, engine) else { continue };
+            let is_deleted = |atom: &Atom| {
+                atom.predicate.name == predicate && atom.arguments.iter().map(Term::name).eq(&arguments)
+            };
+            let new_value = |atom: &Atom| match &atom.arguments[..] {
+                [subject, value] if atom.predicate.name == predicate && subject.name() == &arguments[0] => {
+                    Some(value.name().clone())
+                }
+                _ => None,
+            };
+            let is_functional = self.terms.functional.contains(&predicate);
+            let new_value = added.iter().find_map(new_value).filter(|_| is_functional);
+            if new_value.is_some() || deleted.iter().any(is_deleted) {
+                delta.delete.push(fact.clone());
+            }
+            // Other values, such as texts, remain facts of the problem only.
+            if let Some(number) = new_value.as_ref().and_then(names::number) {
+                let number = engine.symbols_mut().literal(number);
+                delta.insert.push(Fact::new(fact.predicate, [fact.arguments[0], number]));
+            }
+        }
+        delta
     }
 
     /// Makes designs of a filled problem realisable (`true`) or unrealisable (`false`) in every state, and returns the

@@ -16,7 +16,7 @@ use super::happening::Part;
 use super::options::Options;
 use super::plan::PlanStep;
 use super::relevant::relevant;
-use super::running::is_durative;
+use super::running::{Running, is_durative};
 use super::step;
 use super::verdict::Violation;
 use super::world::{Arguments, State, Symbol, World};
@@ -69,6 +69,34 @@ pub fn advance(
     advance_from(&Execution::new(&world, &Options::default().with_chosen_durations(true)), step, forced)
 }
 
+/// Executes one step like [`advance`] with `forced`, but with a given duration, and without the effects that cannot be
+/// evaluated, for example because a function has no value.
+///
+/// # Errors
+/// Returns a violation if no action fits the step.
+pub fn advance_defined(
+    domain: &Domain,
+    problem: &Problem,
+    step: &PlanStep,
+    duration: &BigRational,
+) -> Result<Advance, Box<Violation>> {
+    let reduced = relevant(domain, problem, std::slice::from_ref(step), None);
+    let world = World::new(domain, reduced.as_ref().unwrap_or(problem), &|| false);
+    let options = Options::default().with_chosen_durations(true);
+    let initial = Execution::new(&world, &options);
+    let (step, start) = (step::resolve(&world, 1, step), BigRational::default());
+    let instance = initial.likely_instance(&step, &start)?.clone();
+    let (duration, end) = (duration.clone(), duration.clone());
+    let running = Running { step: &step, instance, start, duration, end };
+    let (mut execution, mut assigned) = (initial.clone(), FxHashMap::default());
+    for when in [EffectTime::AtStart, EffectTime::AtEnd] {
+        let changes = execution.defined_changes(&running, when);
+        note(&changes, &mut assigned);
+        execution.apply(&step, &running.end, changes)?;
+    }
+    Ok(difference(&initial.state, &execution, assigned, running.duration))
+}
+
 /// Executes each step separately in the initial state of a problem, like [`advance`] with `forced = false`. Also
 /// returns the metric value of the empty plan, like [`metric_after`] with the time 0.
 pub fn advance_each(
@@ -92,7 +120,6 @@ fn advance_from(
     let world = initial.world;
     let step = step::resolve(world, 1, step);
     let mut execution = initial.clone();
-    let before = &initial.state;
     let start = BigRational::default();
     let running =
         if forced { execution.begin_anyway(&step, &start) } else { execution.begin(&step, &start) }?;
@@ -117,7 +144,18 @@ fn advance_from(
         note(&changes, &mut assigned);
         execution.apply(&step, time, changes)?;
     }
-    let after = &execution.state;
+    Ok(difference(&initial.state, &execution, assigned, running.duration))
+}
+
+/// Returns the changes from the state `before` to the state of `execution`. `assigned` contains the functions on which
+/// the step has an effect, and whether the effect is an assignment.
+fn difference(
+    before: &State,
+    execution: &Execution<'_, '_>,
+    assigned: FxHashMap<Ground, bool>,
+    duration: BigRational,
+) -> Advance {
+    let (world, after) = (execution.world, &execution.state);
     let values = assigned.into_iter().filter_map(|(target, assigned)| {
         let after = after.values.get(&target)?.clone();
         let (function, text) = (atom(world, &target), world.show(target.0, &target.1));
@@ -126,8 +164,8 @@ fn advance_from(
     let mut values: Vec<ValueChange> = values.collect();
     values.sort_by(|left, right| left.text.cmp(&right.text));
     let (added, deleted) = (facts_only_in(world, after, before), facts_only_in(world, before, after));
-    let metric = metric(world, after, &running.duration);
-    Ok(Advance { added, deleted, values, duration: running.duration, metric })
+    let metric = metric(world, after, &duration);
+    Advance { added, deleted, values, duration, metric }
 }
 
 impl Advance {

@@ -80,6 +80,35 @@ impl<'p> Evaluator<'_, 'p> {
             }
         }
     }
+
+    /// Like [`Self::collect`], but leaves out the parts of the effect that cannot be evaluated.
+    pub(super) fn collect_defined(
+        &self,
+        effect: &'p Effect,
+        bindings: &mut Bindings<'p>,
+        changes: &mut Changes,
+    ) {
+        match effect {
+            Effect::And(parts) => {
+                parts.iter().for_each(|part| self.collect_defined(part, bindings, changes));
+            }
+            Effect::ForAll(variables, body) => {
+                self.world.each(variables, bindings, &mut |bindings| {
+                    self.collect_defined(body, bindings, changes);
+                    true
+                });
+            }
+            Effect::When(condition, body) => {
+                if self.holds(condition, bindings).unwrap_or(false) {
+                    self.collect_defined(body, bindings, changes);
+                }
+            }
+            Effect::Add(_) | Effect::Delete(_) | Effect::Assign(..) => {
+                // An error of a single effect leaves `changes` as they are.
+                let _ = self.collect(effect, bindings, changes);
+            }
+        }
+    }
 }
 
 fn change(kind: Assignment, value: BigRational) -> Result<Change, Undefined> {
@@ -122,20 +151,17 @@ impl Changes {
         // All values are computed first, so that an error leaves the state unchanged.
         let mut values = Vec::new();
         for (target, change) in self.numeric {
-            let old_value = || {
-                let show = || Undefined::Function(world.show(target.0, &target.1));
-                state.values.get(&target).ok_or_else(show)
-            };
-            let new_value = match &change {
-                Change::Assign(value) => value.clone(),
-                Change::Add(value) => apply(Arithmetic::Add, old_value()?, value)?,
-                Change::Scale(value) => apply(Arithmetic::Multiply, old_value()?, value)?,
-            };
+            let new_value = new_value(world, state, &target, &change)?;
             values.push((target, new_value));
         }
         state.values.extend(values);
         change_facts(self.added, self.deleted, state);
         Ok(())
+    }
+
+    /// Removes the changes of values that have no result, for example increases of a function without a value.
+    pub(super) fn retain_defined(&mut self, world: &World<'_>, state: &State) {
+        self.numeric.retain(|target, change| new_value(world, state, target, change).is_ok());
     }
 
     pub(super) fn concern(&self, symbols: &FxHashSet<Symbol>) -> bool {
@@ -150,6 +176,23 @@ impl Changes {
     pub(super) fn is_neutral(&self) -> bool {
         let is_zero = |change: &Change| matches!(change, Change::Add(value) if value.is_zero());
         self.added.is_empty() && self.deleted.is_empty() && self.numeric.values().all(is_zero)
+    }
+}
+
+fn new_value(
+    world: &World<'_>,
+    state: &State,
+    target: &Ground,
+    change: &Change,
+) -> Result<BigRational, Undefined> {
+    let old_value = || {
+        let show = || Undefined::Function(world.show(target.0, &target.1));
+        state.values.get(target).ok_or_else(show)
+    };
+    match change {
+        Change::Assign(value) => Ok(value.clone()),
+        Change::Add(value) => apply(Arithmetic::Add, old_value()?, value),
+        Change::Scale(value) => apply(Arithmetic::Multiply, old_value()?, value),
     }
 }
 

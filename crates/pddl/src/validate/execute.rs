@@ -87,19 +87,30 @@ impl<'e, 'p> Execution<'e, 'p> {
         Err(first_violation.unwrap_or_else(|| unresolved(self.world, step, time)))
     }
 
-    /// Starts a step as an instance of the first schema that fits its name and objects. Conditions are not
-    /// checked, but the duration is.
+    /// Starts a step as an instance of the [likely](Self::likely_instance) schema. Conditions are not checked, but the
+    /// duration is.
     pub(super) fn begin_anyway(
         &self,
         step: &'e Step<'p>,
         time: &BigRational,
     ) -> Result<Running<'e, 'p>, Box<Violation>> {
-        let Some(instance) = step.instances.first() else {
-            return Err(unresolved(self.world, step, time));
-        };
+        let instance = self.likely_instance(step, time)?;
         let duration = self.duration(step, instance, time)?;
         let end = time + &duration;
         Ok(Running { step, instance: instance.clone(), start: time.clone(), duration, end })
+    }
+
+    /// Returns the instance of the first schema that [`Self::begin`] accepts. If it accepts none, returns that of the
+    /// first schema that fits the step's name and objects.
+    pub(super) fn likely_instance(
+        &self,
+        step: &'e Step<'p>,
+        time: &BigRational,
+    ) -> Result<&'e Instance<'p>, Box<Violation>> {
+        let is_ambiguous = step.instances.len() > 1;
+        let is_accepted = |instance: &&Instance<'p>| self.begin_as(step, instance, time).is_ok();
+        let accepted = step.instances.iter().find(|instance| is_ambiguous && is_accepted(instance));
+        accepted.or(step.instances.first()).ok_or_else(|| unresolved(self.world, step, time))
     }
 
     fn begin_as(
@@ -329,6 +340,18 @@ impl<'e, 'p> Execution<'e, 'p> {
                 .map_err(|error| self.effect_violation(running.step, time, &error))?;
         }
         Ok(changes)
+    }
+
+    /// Like [`Self::changes`], but without the effects that cannot be evaluated.
+    pub(super) fn defined_changes(&self, running: &Running<'e, 'p>, when: EffectTime) -> Changes {
+        let mut changes = Changes::default();
+        let evaluator = self.evaluator(Some(&running.duration));
+        let mut bindings = running.instance.bindings.clone();
+        for effect in effects(&running.instance, when) {
+            evaluator.collect_defined(effect, &mut bindings, &mut changes);
+        }
+        changes.retain_defined(self.world, &self.state);
+        changes
     }
 
     /// Applies the changes of a happening to the state. Recomputes the derived facts if a changed predicate or

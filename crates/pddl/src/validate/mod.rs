@@ -38,7 +38,7 @@ use num_traits::Zero;
 
 use crate::ast::{Direction, Domain, Name, Problem};
 
-pub use advance::{Advance, ValueChange, advance, advance_each, metric_after};
+pub use advance::{Advance, ValueChange, advance, advance_defined, advance_each, metric_after};
 pub use budget::Interrupted;
 pub use course::{Course, CourseMoment, NumberBound, course};
 pub use options::Options;
