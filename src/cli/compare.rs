@@ -116,15 +116,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let text = "`--pairs` and `--pair` are for missions whose problem spells out places (see the book: Compare with PRISM)";
         return Err(Failure::usage(Message::error("M129", text)));
     }
-    if let Some(loss) = &coadaptation.loss
-        && !coadaptation
-            .configurations
-            .iter()
-            .any(|configuration| configuration.components.contains(&loss.component))
-    {
-        let text = format!("no configuration needs a component `{}` that could be lost", loss.component);
-        return Err(Failure::usage(Message::error("M125", text)));
-    }
+    coadaptation.check_loss().map_err(Failure::usage)?;
     let added = match &arguments.published {
         Some(path) => published_rows(path)?,
         None => Vec::new(),

@@ -359,6 +359,19 @@ impl Coadaptation {
         [&roles.configured, &roles.suits].iter().any(|role| !facts.of(role).is_empty())
     }
 
+    /// Checks that some configuration needs the component that may be lost.
+    ///
+    /// # Errors
+    /// No configuration needs this component, so nothing would be lost.
+    pub fn check_loss(&self) -> Result<(), Message> {
+        let Some(Loss { component, .. }) = &self.loss else { return Ok(()) };
+        if (0..self.configurations.len()).any(|configuration| self.lost(configuration)) {
+            return Ok(());
+        }
+        let text = format!("no configuration needs a component `{component}` that could be lost");
+        Err(Message::error("M125", text))
+    }
+
     /// Returns `true` if the configuration needs the component that may be lost.
     pub fn lost(&self, configuration: usize) -> bool {
         self.loss

@@ -185,13 +185,12 @@ pub(crate) struct Exploration<S, N> {
 impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
     pub fn new<G: Generator<N, State = S>>(generator: &G, bounds: &Bounds<'_>) -> Result<Self, Error> {
         let mut states = States::new(generator.codes());
+        let limit = bounds.states.min(MAX_COUNT);
         for start in generator.starts() {
             let probe = states.probe(&start, |state| generator.code(state));
-            let number = states.insert(start, probe);
-            number.ok_or_else(|| Error::StateLimit {
-                states: states.len(),
-                limit: bounds.states.min(MAX_COUNT),
-            })?;
+            if states.insert(start, probe).is_none() || states.len() > limit {
+                return Err(Error::StateLimit { states: states.len(), limit });
+            }
         }
         let rewards = vec![Vec::new(); generator.rewards()];
         let explored = Explored { mdp: Mdp::default(), starts: states.len(), states, rewards, deadlocks: 0 };

@@ -22,11 +22,37 @@ pub fn evaluate<N: Number>(problem: Problem<'_, N>, policy: &[u32]) -> Option<So
     solve(Problem { allowed: Some(&allowed), ..problem }, None)
 }
 
+/// Relative difference of doubles up to which values of choices or policies count as equal.
+const TIE_TOLERANCE: f64 = 1e-9;
+
+/// Returns `true` if a policy is optimal with respect to a solution: in all states with a finite value, the values of the
+/// policy are equal to those of the solution. In doubles, they may differ by the errors of both and a relative tolerance.
+///
+/// Returns `None` if exact arithmetic exceeds its budget.
+pub(crate) fn attains<N: Number>(
+    problem: Problem<'_, N>,
+    policy: &[u32],
+    solution: &Solution<N>,
+) -> Option<bool> {
+    let attained = evaluate(problem, policy)?;
+    let is_equal = |state: usize| {
+        if attained.infinite.contains(state) {
+            return false;
+        }
+        let (value, optimum) = (&attained.values[state], &solution.values[state]);
+        let difference = (value.to_f64() - optimum.to_f64()).abs();
+        let tolerance = || attained.errors[state] + solution.errors[state] + TIE_TOLERANCE * optimum.to_f64();
+        if N::EXACT { value == optimum } else { difference <= tolerance() }
+    };
+    let mut finite = (0..problem.mdp.states()).filter(|state| !solution.infinite.contains(*state));
+    Some(finite.all(is_equal))
+}
+
 /// Returns the optimal choices with respect to a solution, in the states that have a finite value and are
 /// neither terminal nor blocked.
 ///
-/// In doubles, choices within a tolerance of the optimum count as optimal. The choices of the solution's policy
-/// count in any case.
+/// In doubles, choices within a tolerance of the optimum count as optimal, so a policy of such choices may lose more than
+/// the tolerance over many steps. The choices of the solution's policy count in any case.
 pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -> FixedBitSet {
     let mdp = problem.mdp;
     let mut optimal = FixedBitSet::with_capacity(mdp.choice_count());
@@ -44,7 +70,7 @@ pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -
                 sum.plus(&probability.times(&solution.values[target]))
             });
             let difference = (worth.to_f64() - value.to_f64()).abs();
-            let keeps = if N::EXACT { worth == *value } else { difference <= 1e-9 * value.to_f64() };
+            let keeps = if N::EXACT { worth == *value } else { difference <= TIE_TOLERANCE * value.to_f64() };
             if keeps || solution.policy[state] as usize == choice {
                 optimal.insert(choice);
             }
@@ -53,7 +79,7 @@ pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -
     optimal
 }
 
-/// Minimises a secondary reward over the policies that are optimal for a problem.
+/// Minimises a secondary reward over the policies that consist of [optimal choices](conserving) for a problem.
 ///
 /// A policy that maximises a probability may contain cycles before success or after failure, which
 /// do not change the probability. The resulting policy instead reaches a terminal state or a state

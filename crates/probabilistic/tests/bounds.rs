@@ -376,6 +376,41 @@ fn the_policy_for_tiny_values_is_optimal() {
     assert_eq!(quantity.exact.map(|exact| exact.to_string()).as_deref(), Some("1/100000000"));
 }
 
+/// In each step, the other choice loses less than 1e-9 of the optimal value, but the sum of these losses is large.
+#[test]
+fn ties_are_not_broken_in_favour_of_a_worse_policy() {
+    let cases = [
+        (["1e-8", "2e-8"], ["1", "2.05"], "R{\"cost\"}min=? [ F s=1 ]", 1e8),
+        (["1e-10", "1.5e-10"], ["1", "1.6"], "R{\"cost\"}min=? [ F s=1 ]", 1e10),
+        (["1e-10", "1e-12"], ["1", "1"], "R{\"cost\"}min=? [ F s=1 ]", 1e10),
+        (["1e-9*0.5", "0.8e-9"], ["1", "1"], "Pmax=? [ F s=1 ]", 0.5),
+    ];
+    for ([slow, quick], [slow_cost, quick_cost], question, expected) in cases {
+        let failure = if question.starts_with('P') { ["1e-9*0.5", "1.2e-9"] } else { ["0", "0"] };
+        let [slow_failure, quick_failure] = failure;
+        let model = format!(
+            "mdp
+            module m s:[0..2] init 0;
+              [slow] s=0 -> {slow}:(s'=1) + {slow_failure}:(s'=2) + 1-{slow}-{slow_failure}:true;
+              [quick] s=0 -> {quick}:(s'=1) + {quick_failure}:(s'=2) + 1-{quick}-{quick_failure}:true;
+            endmodule
+            rewards \"cost\" [slow] true : {slow_cost}; [quick] true : {quick_cost}; endrewards
+            rewards \"effort\" [slow] true : 1; [quick] true : 1e-6; endrewards"
+        );
+        let model = prism::parse(&model).expect("a model");
+        let property = property::parse(question).expect("a property");
+        for secondary in [None, Some("effort".to_owned())] {
+            let options = Options::default().with_exactness(Exactness::Never).with_policy(true);
+            let report = check(&model, &property, &options.with_secondary(secondary)).expect("an answer");
+            let evaluation =
+                Options::default().with_exactness(Exactness::Always).with_evaluation(report.policy);
+            let exact = check(&model, &property, &evaluation).expect("an answer").outcome;
+            let Outcome::Value(Answer::Finite(quantity)) = exact else { panic!("{exact:?}") };
+            assert!((quantity.value / expected - 1.0).abs() < 1e-6, "{question} {slow}: {quantity:?}");
+        }
+    }
+}
+
 #[test]
 fn two_objectives_in_doubles_have_enclosing_bounds() {
     let model = "mdp

@@ -24,6 +24,27 @@ rewards \"toll\" [b] true : 2; s=1 : 1; endrewards
 label \"goal\" = done & t>=1;
 ";
 
+/// The exploration reports the excess before all initial states are listed.
+#[test]
+fn initial_states_count_for_the_limit_on_states() {
+    let model = "mdp module m x:[0..9999]; [] true -> true; endmodule init x>=10 endinit";
+    let model = prism::parse(model).expect("a model");
+    let question = property::parse("Pmax=? [ F x=1 ]").expect("a property");
+    for exactness in [Exactness::Always, Exactness::Never] {
+        let limited = |states: usize| {
+            let bounds = Bounds::default().with_states(states);
+            check(&model, &question, &Options::default().with_exactness(exactness).with_bounds(bounds))
+        };
+        let report = limited(9990).expect("all states are within the limit");
+        assert_eq!(report.states, 9990);
+        for limit in [0, 1000, 9989] {
+            let error = limited(limit).expect_err("the limit is exceeded");
+            let Error::StateLimit { states, limit: reported } = error else { panic!("{error}") };
+            assert_eq!((states, reported), (limit + 1, limit));
+        }
+    }
+}
+
 const WORDS: [&str; 24] = [
     "module",
     "endmodule",

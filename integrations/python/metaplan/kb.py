@@ -73,8 +73,14 @@ def load(source: Any, path: str | os.PathLike[str] | None = None) -> Knowledge:
     """
     if isinstance(source, Mapping):
         joined = rdflib.Graph()
-        for own in source.values():
-            joined += _graph(own)
+        worlds: list[Any] = []
+        for each in source.values():
+            graph, world = _graph(each), _world(each)
+            if world is not None:
+                if world not in worlds:
+                    worlds.append(world)
+                graph = _renamed(graph, f"world{worlds.index(world)}_")
+            joined += graph
         return Knowledge(joined, path)
     return Knowledge(_graph(source), path)
 
@@ -86,6 +92,22 @@ def _restored(document: bytes, path: str | None) -> Knowledge:
     if not knowledge.path.exists():
         knowledge.path.write_bytes(document)
     return knowledge
+
+
+def _world(source: Any) -> Any:
+    """Returns the owlready2 world of a world, an ontology or a graph of them; ``None`` for other graphs."""
+    if isinstance(source, rdflib.Graph) and not hasattr(source, "world"):
+        return getattr(source.store, "world", None)
+    return getattr(source, "world", source)
+
+
+def _renamed(graph: rdflib.Graph, prefix: str) -> rdflib.Graph:
+    """Returns a copy with a prefix before the names of blank nodes, because each owlready2 world numbers them from 1."""
+    renamed = rdflib.Graph()
+    for triple in graph:
+        subject, predicate, value = (rdflib.BNode(prefix + node) if isinstance(node, rdflib.BNode) else node for node in triple)
+        renamed.add((subject, predicate, value))
+    return renamed
 
 
 def _graph(source: Any) -> rdflib.Graph:

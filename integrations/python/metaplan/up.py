@@ -35,10 +35,12 @@ from unified_planning.engines import (
 )
 from unified_planning.engines.compilers import BoundedTypesRemover
 from unified_planning.engines.compilers.usertype_fluents_remover import UsertypeFluentsRemover
+from unified_planning.engines.compilers.utils import get_fresh_name
 from unified_planning.engines.mixins import AnytimePlannerMixin, OneshotPlannerMixin, PlanValidatorMixin
 from unified_planning.io import PDDLWriter
 from unified_planning.io.pddl_writer import ConverterToPDDLString
-from unified_planning.model import FNode, Problem, ProblemKind
+from unified_planning.model import DurativeAction, EndTiming, Fluent, FNode, Problem, ProblemKind, StartTiming
+from unified_planning.model.metrics import MinimizeActionCosts
 from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, TimeTriggeredPlan
 
 from metaplan._answers import Plan, Step
@@ -55,7 +57,7 @@ _FEATURES: dict[str, tuple[str, ...]] = {
     # Products of changing numbers are not visible in the problem kind, so they are rejected on
     # reading.
     "problem_type": ("SIMPLE_NUMERIC_PLANNING", "GENERAL_NUMERIC_PLANNING"),
-    "time": ("CONTINUOUS_TIME", "DISCRETE_TIME"),
+    "time": ("CONTINUOUS_TIME", "SELF_OVERLAPPING"),
     "expression_duration": ("STATIC_FLUENTS_IN_DURATIONS", "INT_TYPE_DURATIONS", "REAL_TYPE_DURATIONS"),
     "numbers": ("BOUNDED_TYPES",),
     "conditions_kind": (
@@ -151,13 +153,51 @@ def _exact(method: Any) -> FunctionType:
     return FunctionType(method.__code__, names, method.__name__, method.__defaults__, method.__closure__)
 
 
+def _with_guards(problem: Problem) -> Problem:
+    """Returns a copy in which an action cannot start while it is running with the same arguments; in PDDL it can."""
+    guarded = problem.clone()
+    manager, fluents_of = problem.environment.expression_manager, problem.environment.free_vars_extractor
+    static = problem.get_static_fluents()
+    for action in guarded.actions:
+        if not isinstance(action, DurativeAction):
+            continue
+        duration = action.duration
+        lasts = manager.TRUE() if duration.is_left_open() else manager.GT(duration.lower, 0).simplify()
+        # Start and end of a run without duration are one happening, which cannot set the guard and reset it.
+        is_known = duration.lower == duration.upper and all(each.fluent() in static for each in fluents_of.get(lasts))
+        if not lasts.is_true() and not is_known:
+            text = f"the duration of {action.name} is chosen or changes, may be 0, and self_overlapping is False"
+            raise up.exceptions.UPUnsupportedProblemTypeError(text)
+        if lasts.is_false():
+            continue
+        name = get_fresh_name(guarded, f"running_{action.name}")
+        guard = Fluent(name, None, action.parameters, problem.environment)
+        guarded.add_fluent(guard, default_initial_value=False)
+        running = guard(*action.parameters)
+        action.add_condition(StartTiming(), manager.Not(running))
+        action.add_effect(StartTiming(), running, True, lasts)
+        action.add_effect(EndTiming(), running, False, lasts)
+    return guarded
+
+
+def _with_all_costs(problem: Problem, costs: MinimizeActionCosts) -> Problem:
+    """Returns a copy with costs for actions of the same names; the writer requires a cost of each action, which is 0 by default."""
+    problem = problem.clone()
+    problem.clear_quality_metrics()
+    by_action = {problem.action(action.name): cost for action, cost in costs.costs.items()}
+    default = 0 if costs.default is None else costs.default
+    problem.add_quality_metric(MinimizeActionCosts(by_action, default, problem.environment))
+    return problem
+
+
 class _Writer(PDDLWriter):
     """Writes problems as PDDL: with exact numbers, and with optional goals as preferences."""
 
+    problem: Problem
     _write_domain = _exact(PDDLWriter._write_domain)
     _write_problem = _exact(PDDLWriter._write_problem)
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, guards: bool = False) -> None:
         self._optional: list[tuple[FNode, Fraction]] = []
         if problem.kind.has_oversubscription():
             metric, *others = problem.quality_metrics
@@ -170,11 +210,23 @@ class _Writer(PDDLWriter):
                 # A goal with a negative gain is replaced by its negation with a positive gain.
                 goal = manager.auto_promote(goal)[0]
                 self._optional.append((goal, Fraction(gain)) if gain >= 0 else (manager.Not(goal), -Fraction(gain)))
+        self._unguarded = problem
+        metrics = problem.quality_metrics
+        if guards:
+            problem = _with_guards(problem)
+        # The writer rejects several metrics. Costs are defined for actions without guards.
+        if len(metrics) == 1 and metrics[0].is_minimize_action_costs():
+            if guards or any(metrics[0].get_action_cost(action) is None for action in problem.actions):
+                problem = _with_all_costs(problem, metrics[0])
         PDDLWriter.__init__(self, problem, rewrite_bool_assignments=True)
 
     def get_problem(self) -> str:
         """Returns the problem as PDDL."""
+        # Guards are false at the start, so they are not written. The writer would enumerate all their arguments.
+        guarded = self.problem
+        self.problem = self._unguarded
         text: str = PDDLWriter.get_problem(self)
+        self.problem = guarded
         if not self._optional:
             return text
         converter = _Converter(self.problem.environment, self._get_mangled_name)
@@ -202,7 +254,7 @@ class _Written:
         if problem.kind.has_bounded_types():
             problem = self._compiled(BoundedTypesRemover(), problem, CompilationKind.BOUNDED_TYPES_REMOVING)
         self.written = problem
-        self.writer = _Writer(problem)
+        self.writer = _Writer(problem, guards=self.timed and not self.problem.self_overlapping)
 
     def _compiled(self, compiler: Any, problem: Problem, kind: CompilationKind) -> Problem:
         result = compiler.compile(problem, kind)
@@ -219,7 +271,9 @@ class _Written:
 
         def instance(step: Step) -> ActionInstance:
             objects = [manager.ObjectExp(self.writer.get_item_named(name)) for name in step.arguments]
-            own = ActionInstance(self.writer.get_item_named(step.action), tuple(objects))
+            # The writer's action may have a guard.
+            action = self.written.action(self.writer.get_item_named(step.action).name)
+            own = ActionInstance(action, tuple(objects))
             for back in self._back:
                 own = back(own)
             return own
@@ -229,7 +283,7 @@ class _Written:
 
         def timed(step: Step) -> tuple[Fraction, ActionInstance, Fraction | None]:
             own = instance(step)
-            lasts = isinstance(own.action, up.model.DurativeAction)
+            lasts = isinstance(own.action, DurativeAction)
             return Fraction(step.start), own, Fraction(step.duration) if lasts else None
 
         return TimeTriggeredPlan([timed(step) for step in found], environment)
@@ -251,6 +305,12 @@ _STATUSES = {
     "unsolvable_within_horizon": PlanGenerationResultStatus.UNSOLVABLE_INCOMPLETELY,
     "unknown": PlanGenerationResultStatus.TIMEOUT,
 }
+
+_UNPROVED = (
+    PlanGenerationResultStatus.SOLVED_SATISFICING,
+    PlanGenerationResultStatus.TIMEOUT,
+    PlanGenerationResultStatus.MEMOUT,
+)
 
 _MAX_SHARE = 1e6
 """Maximum time limit of a search without a timeout, in seconds. Without it, the doubled limits could not be represented at some time."""
@@ -330,7 +390,7 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             result = self._answer(problem, limit, output_stream)
             # Without a metric, all plans are equally good.
             is_best = result.plan is not None and not problem.quality_metrics
-            is_unproved = result.status in (PlanGenerationResultStatus.SOLVED_SATISFICING, PlanGenerationResultStatus.TIMEOUT)
+            is_unproved = result.status in _UNPROVED
             # A search that ends without a proof long before its time limit has reached another limit, such as that on memory.
             is_ended = is_best or not is_unproved or time.monotonic() - round_began < limit / 2
             is_better = result.plan is not None and (best is None or _is_better(result, best, maximizes))
@@ -368,13 +428,15 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             found = mission.plan(time_limit=timeout, **options)
         except Error as error:
             if error.code.startswith("M130") or (timeout is not None and time.monotonic() - began >= timeout):
-                return self._none(PlanGenerationResultStatus.TIMEOUT, str(error))
+                return self._none(self._limit_status(began, timeout), str(error))
             return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, str(error))
         except (up.exceptions.UPException, NotImplementedError) as error:
             return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, str(error) or repr(error))
         if output_stream is not None:
             output_stream.write(f"{found.verdict}\n")
         status = _STATUSES[found.status]
+        if status == PlanGenerationResultStatus.TIMEOUT:
+            status = self._limit_status(began, timeout)
         if found and status == PlanGenerationResultStatus.SOLVED_OPTIMALLY and not problem.quality_metrics:
             status = PlanGenerationResultStatus.SOLVED_SATISFICING
         metrics = {"engine_internal_time": str(time.monotonic() - began), "horizon": str(found.horizon)}
@@ -390,6 +452,13 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             metrics=metrics,
             log_messages=[LogMessage(LogLevel.INFO, found.verdict)],
         )
+
+    def _limit_status(self, began: float, timeout: float | None) -> PlanGenerationResultStatus:
+        """Returns the status of a search that a limit has ended now: that on memory if there is one and the time is not over."""
+        is_over = timeout is not None and time.monotonic() - began >= timeout
+        if is_over or self._options["memory_limit"] is None:
+            return PlanGenerationResultStatus.TIMEOUT
+        return PlanGenerationResultStatus.MEMOUT
 
     def _none(self, status: PlanGenerationResultStatus, text: str) -> PlanGenerationResult:
         return PlanGenerationResult(status, None, engine_name=self.name, log_messages=[LogMessage(LogLevel.ERROR, text)])
@@ -460,7 +529,10 @@ def compile(problem: Problem | Mission, *knowledge: str, **options: Any) -> Prob
     else:
         writer = _Writer(problem)
         mission = Mission.from_files(writer.get_domain(), writer.get_problem(), knowledge, **options)
-    return PDDLReader().parse_problem_string(*mission.pddl())
+    compiled = PDDLReader().parse_problem_string(*mission.pddl())
+    if isinstance(problem, Problem):
+        compiled.self_overlapping = problem.self_overlapping
+    return compiled
 
 
 def register(environment: up.environment.Environment | None = None) -> None:

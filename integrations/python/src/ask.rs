@@ -11,6 +11,7 @@ use metaplan::codes;
 use metaplan::knowledge::{Knowledge, Sources};
 use metaplan::message::{Errors, Message};
 use metaplan::probabilistic::check::{Exactness, Options, check as checked};
+use metaplan::probabilistic::explore::Bounds;
 use metaplan::probabilistic::{Error, prism, property};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -88,13 +89,21 @@ pub(crate) fn check(
         Some(false) => Exactness::Never,
         None => Exactness::Auto,
     };
+    let interrupt = AtomicBool::new(false);
     let answered = || -> Result<String, Error> {
         let read = prism::parse(model)?;
         let parsed_property = property::parse(property)?;
-        let options = Options::default().with_settings(constants).with_exactness(exactness);
+        let continues = |_: usize| !interrupt.load(Ordering::Relaxed);
+        let bounds = Bounds::default().with_progress(&continues);
+        let options =
+            Options::default().with_settings(constants).with_exactness(exactness).with_bounds(bounds);
         Ok(json(&CheckAnswer::new(property, &checked(&read, &parsed_property, &options)?)))
     };
-    py.detach(answered).map_err(|error| {
+    let (answer, stopped) = detached(py, &interrupt, answered);
+    if let Some(error) = stopped {
+        return Err(error);
+    }
+    answer.map_err(|error| {
         let (file, text) =
             if matches!(error, Error::Model(_)) { (name, model) } else { ("property", property) };
         let messages: Vec<Message> = match error.diagnostics() {

@@ -295,6 +295,10 @@ impl Mission {
         penalty: Option<f64>,
         state_limit: usize,
     ) -> PyResult<String> {
+        if let Some(penalty) = penalty.filter(|penalty| !(0.0..f64::INFINITY).contains(penalty)) {
+            let text = format!("penalty must be a time that is at least 0, not {penalty}");
+            return Err(PyValueError::new_err(text));
+        }
         let setup = self.read();
         let mut roles = setup.roles.clone();
         if let Some((component, rate)) = loss {
@@ -310,6 +314,7 @@ impl Mission {
                 Some(tasked) => tasked.coadaptation.clone(),
                 None => Coadaptation::new(mission, &problem, &roles)?,
             };
+            own.check_loss().map_err(Errors::from)?;
             let compared = Compared { mission, roles: &roles, coadaptation: &own, tasked: tasked.as_ref() };
             let (risk, memory) = (Risk::all(&own), &|| None);
             let config = comparison::Config {

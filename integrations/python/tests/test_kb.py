@@ -7,6 +7,8 @@ import pytest
 
 rdflib = pytest.importorskip("rdflib", reason="rdflib is not there")
 
+from rdflib.compare import isomorphic
+
 import metaplan
 import metaplan.kb
 
@@ -45,6 +47,29 @@ def test_an_owlready2_world_is_a_knowledge_base(tmp_path):
     design = rdflib.URIRef("http://metacontrol.org/metaplan/ugv#fd_amcl_kinect")
     facts = list(world.as_rdflib_graph().objects(design, rdflib.URIRef(TOMASYS + "fd_realisability")))
     assert [str(fact).lower() for fact in facts] == ["false"]
+
+
+def test_owlready2_worlds_that_are_joined_keep_their_axioms():
+    owlready2 = pytest.importorskip("owlready2", reason="owlready2 is not there")
+    worlds, ontologies = [], []
+    for name in ("one", "two"):
+        worlds.append(owlready2.World())
+        ontologies.append(worlds[-1].get_ontology(f"http://e/{name}#"))
+        with ontologies[-1]:
+            concept = type("A", (owlready2.Thing,), {})
+            role = type("p", (owlready2.ObjectProperty,), {})
+            concept.is_a.append(role.only(concept) if name == "one" else role.some(concept))
+    expected = sum((read_back(world) for world in worlds), rdflib.Graph())
+    for sources in (worlds, [*worlds, ontologies[0]], [worlds[0], worlds[1].as_rdflib_graph()]):
+        joined = metaplan.kb.load(dict(enumerate(sources)))
+        assert isomorphic(rdflib.Graph().parse(joined.path), expected)
+        assert joined.path.read_bytes() == metaplan.kb.load(dict(enumerate(sources))).path.read_bytes()
+
+
+def read_back(world):
+    """Returns the document of a single world. Reading it gives all blank nodes new names."""
+    knowledge = metaplan.kb.load(world)
+    return rdflib.Graph().parse(knowledge.path)
 
 
 def test_a_restored_knowledge_base_does_not_overwrite_its_file(tmp_path):

@@ -246,6 +246,33 @@ def test_the_plan_is_compared_with_policies():
     assert len(comparison.to_df()) == len(comparison.candidates) and "<table>" in comparison._repr_html_()
 
 
+@pytest.mark.parametrize("penalty", [-100, float("inf"), float("nan")])
+def test_a_penalty_is_a_time(penalty):
+    with pytest.raises(ValueError, match="penalty"):
+        metaplan.Mission.load(ROOT / "missions/camara_like.toml").compare(penalty=penalty)
+
+
+def test_a_component_that_no_configuration_needs_cannot_be_lost():
+    with pytest.raises(metaplan.Error, match="M125"):
+        metaplan.Mission.load(ROOT / "missions/camara_like.toml").compare(loss=("c_unknown", 0.1))
+
+
+def test_a_signal_ends_a_check(tmp_path):
+    model = tmp_path / "long.prism"
+    model.write_text("dtmc module m x:[0..40000000]; [] x<40000000 -> (x'=x+1); endmodule")
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    former = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, 0.3)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            metaplan.check(model, "P=? [ F x=40000000 ]")
+    finally:
+        signal.signal(signal.SIGALRM, former)
+
+
 def tour(places):
     """Returns a tour of all places: a plan is found immediately, but an optimal plan is not."""
     names = [f"p{index}" for index in range(places)]

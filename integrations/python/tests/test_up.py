@@ -202,6 +202,121 @@ def test_optional_goals_are_chosen_best(seed):
     assert evaluated == max(ends)
 
 
+def production(duration, self_overlapping):
+    """Returns a problem that needs two runs of an action, which do not interfere."""
+    problem = Problem("production")
+    problem.self_overlapping = self_overlapping
+    count = problem.add_fluent("count", up.shortcuts.IntType(), default_initial_value=0)
+    produce = up.model.DurativeAction("produce")
+    produce.set_fixed_duration(duration)
+    produce.add_increase_effect(up.shortcuts.EndTiming(), count, 1)
+    problem.add_action(produce)
+    problem.add_goal(up.shortcuts.Equals(count, 2))
+    problem.add_quality_metric(up.model.metrics.MinimizeMakespan())
+    return problem
+
+
+@pytest.mark.parametrize(
+    ("duration", "self_overlapping", "makespan"),
+    [(5, True, 5), (5, False, 10 + Fraction(metaplan.up.SEPARATION)), (0, True, 0), (0, False, 0)],
+)
+def test_runs_of_an_action_overlap_only_if_the_problem_permits_it(duration, self_overlapping, makespan):
+    problem = production(duration, self_overlapping)
+    result = solve(problem)
+    assert result.status == Status.SOLVED_OPTIMALLY and is_valid(problem, result.plan)
+    assert max(start + duration for start, _, duration in result.plan.timed_actions) == makespan
+    assert all(step.action == problem.action("produce") for _, step, _ in result.plan.timed_actions)
+
+
+@pytest.mark.parametrize("durations", [(5, 3), (3, 0), (3, 7)])
+def test_runs_with_different_arguments_overlap(durations):
+    """The duration of a run depends on its argument, and is 0 for some."""
+    problem = production(1, False)
+    problem.clear_actions()
+    machine = up.shortcuts.UserType("machine")
+    lasts = problem.add_fluent("lasts", up.shortcuts.RealType(), machine=machine)
+    produce = up.model.DurativeAction("produce", machine=machine)
+    produce.set_fixed_duration(lasts(produce.machine))
+    produce.add_increase_effect(up.shortcuts.EndTiming(), problem.fluent("count"), 1)
+    problem.add_action(produce)
+    for number, duration in enumerate(durations):
+        problem.set_initial_value(lasts(problem.add_object(f"machine{number}", machine)), duration)
+    result = solve(problem)
+    assert result.status == Status.SOLVED_OPTIMALLY and is_valid(problem, result.plan)
+    # Either one run of each machine, or two runs of one machine, one after the other.
+    best = min(max(durations), *(2 * own + Fraction(metaplan.up.SEPARATION) if own else 0 for own in durations))
+    assert max(start + duration for start, _, duration in result.plan.timed_actions) == best
+
+
+def test_a_problem_with_many_arguments_is_written_fast():
+    """A guard of an action with eight arguments has more than 10^10 atoms."""
+    problem = production(5, False)
+    place = up.shortcuts.UserType("place")
+    problem.add_objects([up.model.Object(f"place{number}", place) for number in range(20)])
+    visit = up.model.DurativeAction("visit", **{f"place{number}": place for number in range(8)})
+    visit.set_fixed_duration(1)
+    problem.add_action(visit)
+    written = metaplan.up._Written(problem)
+    assert "running_visit" in written.writer.get_domain()
+    assert "running_visit" not in written.writer.get_problem()
+
+
+def test_chosen_durations_must_be_positive_unless_runs_may_overlap():
+    for least, status in ((1, SOLVED), (0, (Status.UNSUPPORTED_PROBLEM,))):
+        problem = production(5, False)
+        problem.action("produce").set_closed_duration_interval(least, 3)
+        with OneshotPlanner(name="metaplan") as planner:
+            planner.skip_checks = True
+            assert planner.solve(problem, timeout=600).status in status
+
+
+def test_discrete_time_is_refused():
+    problem = production(5, False)
+    problem.discrete_time = True
+    with OneshotPlanner(name="metaplan") as planner:
+        planner.skip_checks = True
+        result = planner.solve(problem)
+    assert result.status == Status.UNSUPPORTED_PROBLEM
+    assert result.log_messages[0].message == "not supported: discrete time"
+
+
+@pytest.mark.parametrize("is_timed", [False, True])
+def test_actions_without_a_cost_cost_nothing(is_timed):
+    problem = Problem("costs")
+    done = problem.add_fluent("done", default_initial_value=False)
+    for name in ("expensive", "free"):
+        if is_timed:
+            action = up.model.DurativeAction(name)
+            action.set_fixed_duration(1)
+            action.add_effect(up.shortcuts.EndTiming(), done, True)
+        else:
+            action = up.model.InstantaneousAction(name)
+            action.add_effect(done, True)
+        problem.add_action(action)
+    problem.add_goal(done)
+    costs = {problem.action("expensive"): up.shortcuts.Int(1)}
+    problem.add_quality_metric(up.model.metrics.MinimizeActionCosts(costs))
+    result = solve(problem)
+    assert result.status == Status.SOLVED_OPTIMALLY and Fraction(result.metrics["cost"]) == 0
+    steps = [own for _, own, _ in result.plan.timed_actions] if is_timed else result.plan.actions
+    assert [own.action.name for own in steps] == ["free"]
+
+
+def test_the_limit_that_ends_a_search_is_its_status():
+    problem = Problem("walk")
+    fluents = [problem.add_fluent(name, up.shortcuts.IntType(), default_initial_value=0) for name in "xyz"]
+    for name, changes in (("a", (3, -2, 1)), ("b", (-2, 3, 1)), ("c", (1, 1, -3)), ("d", (-1, -1, 2))):
+        action = up.model.InstantaneousAction(name)
+        for fluent, change in zip(fluents, changes):
+            action.add_increase_effect(fluent, change)
+        problem.add_action(action)
+    for fluent, value in zip(fluents, (30_000, 10_001, -77)):
+        problem.add_goal(up.shortcuts.Equals(fluent, value))
+    assert solve(problem, memory_limit=1, engine="search").status == Status.MEMOUT
+    with OneshotPlanner(name="metaplan") as planner:
+        assert planner.solve(problem, timeout=0.5).status == Status.TIMEOUT
+
+
 def test_optional_goals_of_the_package_as_its_own_planner_has_them():
     for name in ("basic_oversubscription", "locations_connected_visited_oversubscription"):
         problem = EXAMPLES[name].problem

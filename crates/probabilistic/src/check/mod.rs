@@ -112,7 +112,8 @@ pub fn check_all<'p>(
     let properties =
         properties.into_iter().map(|property| expand_references(property, &joined, &options.declarations));
     let properties: Vec<_> = properties.collect();
-    let program = Program::<f64>::new(&joined, &options.settings)
+    let max_starts = options.bounds.states;
+    let program = Program::<f64>::within(&joined, &options.settings, max_starts)
         .map_err(|error| blame(error, model, &joined, &options.settings))?;
     let (mut required, mut refused) = (Vec::new(), Vec::new());
     for property in &properties {
@@ -138,7 +139,7 @@ pub fn check_all<'p>(
     let exact = if options.exactness == Exactness::Never {
         None
     } else {
-        let exact = Program::<Fraction>::new(&joined, &options.settings)?;
+        let exact = Program::<Fraction>::within(&joined, &options.settings, max_starts)?;
         Some(exact.with_rewards(&required).stopping(end.as_ref()))
     };
     let mut processes = Processes::explore(&program, exact.as_ref(), options)?;

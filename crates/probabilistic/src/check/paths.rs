@@ -8,7 +8,7 @@ use crate::check::query::Query;
 use crate::check::steps::{self, Stepped};
 use crate::check::vector::{Span, Vector};
 use crate::number::{Number, count, is_whole};
-use crate::policy::with_secondary;
+use crate::policy::{attains, with_secondary};
 use crate::prism::ast::{ModelKind, Path, RewardPath, StepBound, Steps};
 use crate::solve::{Direction, Problem, Solution, draft, solve_within};
 
@@ -212,7 +212,7 @@ impl<N: Number> Query<'_, N> {
 
     /// Computes the optimal values, or the values of the given policy if there is one. If an optimal policy is
     /// reported, ties between optimal choices are broken by the secondary reward (by default, the number of
-    /// steps), where [`with_secondary`] permits this.
+    /// steps), where [`with_secondary`] permits this and the resulting policy is still optimal.
     pub fn solved(&self, problem: Problem<'_, N>) -> Checked<Valued<N>> {
         let span = if problem.rewards.is_none() { Span::Probability } else { Span::Positive };
         let problem = Problem { allowed: self.evaluated.as_ref(), ..problem };
@@ -223,10 +223,11 @@ impl<N: Number> Query<'_, N> {
                 Some(name) => self.rewards(Some(name))?.to_vec(),
                 None => vec![N::one(); self.mdp().choice_count()],
             };
-            if let Some(second) = with_secondary(&problem, &solution, &secondary) {
-                for (choice, better) in policy.iter_mut().zip(&second.policy) {
-                    *choice = *better;
-                }
+            // In exact arithmetic, each policy of optimal choices that ends is optimal.
+            if let Some(second) = with_secondary(&problem, &solution, &secondary)
+                && (N::EXACT || attains(problem, &second.policy, &solution) == Some(true))
+            {
+                policy = second.policy;
             }
         }
         Ok(Valued { vector: Vector::solved(solution, span), policy: Some(policy) })

@@ -82,6 +82,12 @@ impl<N: Number> Program<N> {
     /// names, types and ranges. The errors in variables are returned without those in commands, rewards and
     /// labels, which may follow from them.
     pub fn new(model: &Model, settings: &Settings) -> Result<Self, Error> {
+        Self::within(model, settings, usize::MAX)
+    }
+
+    /// Same as [`Self::new`], but lists only one initial state more than the limit if there are more than this limit. The
+    /// exploration then reports that the limit is exceeded.
+    pub(crate) fn within(model: &Model, settings: &Settings, max_starts: usize) -> Result<Self, Error> {
         let mut names = Names::new(model, settings)?;
         let mut problems = Vec::new();
         let mut program = Self {
@@ -157,7 +163,7 @@ impl<N: Number> Program<N> {
                 problems.push(problem);
             }
         }
-        match program.find_starts(model, &mut names) {
+        match program.find_starts(model, &mut names, max_starts) {
             Ok(starts) => program.starts = starts,
             Err(problem) => problems.push(problem),
         }
@@ -166,14 +172,14 @@ impl<N: Number> Program<N> {
         if problems.is_empty() { Ok(program) } else { Err(Error::Model(problems.into())) }
     }
 
-    fn find_starts(&self, model: &Model, names: &mut Names) -> Result<Vec<Packed>, Diagnostic> {
+    fn find_starts(&self, model: &Model, names: &mut Names, limit: usize) -> Result<Vec<Packed>, Diagnostic> {
         let Some(condition) = &model.initial else {
             let values: Valuation = self.variables.iter().map(|variable| variable.initial).collect();
             return Ok(vec![self.layout.pack(&values)]);
         };
         let place = condition.place;
         let initial_states =
-            starts(names.typed(condition, Type::Bool)?, place, &self.variables, &self.layout)?;
+            starts(names.typed(condition, Type::Bool)?, place, &self.variables, &self.layout, limit)?;
         if initial_states.is_empty() {
             return Err(Diagnostic::new("Q307", place, "there is no state in which `init` holds"));
         }

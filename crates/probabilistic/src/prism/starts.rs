@@ -8,7 +8,8 @@ use crate::prism::state::{Layout, Packed, Valuation};
 /// Upper limit on the number of tried assignments of a value to a variable.
 const MAX_TRIED: usize = 50_000_000;
 
-/// Returns the states that satisfy `condition`, in lexicographic order of the values of the variables.
+/// Returns the states that satisfy `condition`, in lexicographic order of the values of the variables. If there are more
+/// than `limit`, returns only one more than `limit`.
 ///
 /// The search backtracks over the variables. A conjunct is evaluated as soon as all of its
 /// variables have values. Fails if more than [`MAX_TRIED`] values have to be tried, or if a
@@ -18,6 +19,7 @@ pub fn starts(
     place: Place,
     variables: &[Variable],
     layout: &Layout,
+    limit: usize,
 ) -> Result<Vec<Packed>, Diagnostic> {
     let parts = match condition {
         Code::All(parts) => parts,
@@ -53,6 +55,9 @@ pub fn starts(
         let next = at.saturating_add(1);
         if at == variables.len() {
             states.push(layout.pack(&values));
+            if states.len() > limit {
+                return Ok(states);
+            }
         } else if holds(&ready[next], &values)? {
             at = next;
             if let Some(variable) = variables.get(at) {
