@@ -247,6 +247,27 @@ impl Keeper {
         answers
     }
 
+    /// Handles a function that has none of its designs any more, for example after a change of its design that has
+    /// failed and could not be undone. Its objectives are in need of a design again. Returns the answers.
+    pub fn lose_design(&mut self, function: &str) -> Vec<KeeperAnswer> {
+        let mut answers = Vec::new();
+        let objectives = self.configurator.objectives().into_iter().filter(|objective| {
+            objective.function.as_ref().is_some_and(|individual| individual.name == function)
+        });
+        for objective in objectives {
+            let name = objective.individual.name;
+            // A failure of an earlier change must not restore an older design.
+            for change in self.pending_changes.values_mut().filter(|change| change.objective == name) {
+                change.from = None;
+            }
+            if let Err(message) = self.configurator.revert(&name, None) {
+                answers.push(wrong(&message));
+            }
+        }
+        self.adapt(&mut answers);
+        answers
+    }
+
     fn take(&mut self, event: &Event, answers: &mut Vec<KeeperAnswer>) -> Result<(), Refusal> {
         let refused = |message: Message| Refusal::new("M306", message.message.clone());
         let knowledge = self.configurator.knowledge_mut();

@@ -121,6 +121,12 @@ impl Queue {
         }
     }
 
+    /// Forgets the last measurements of the selected attributes, so that a repetition is reported, too.
+    fn forget_measurements(&self, is_selected: impl Fn(&str) -> bool) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.last.retain(|(message, attribute), _| message != MEASUREMENT || !is_selected(attribute));
+    }
+
     /// Returns the pending statuses with the last header, and clears them.
     fn take(&self) -> DiagnosticArray {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
@@ -202,6 +208,12 @@ impl Diagnosed {
         });
         let signals = signals::watch(node, &signals, &report)?;
         Ok(Self { queue, _signals: signals })
+    }
+
+    /// Forgets the last measurements of the selected attributes, whose believed values may have changed otherwise. The
+    /// next measurement is then reported even if it repeats the last one.
+    pub(crate) fn forget_measurements(&self, is_selected: impl Fn(&str) -> bool) {
+        self.queue.forget_measurements(is_selected);
     }
 
     /// Returns the pending statuses as an input line and clears them.
@@ -376,6 +388,19 @@ mod tests {
         assert_eq!(robot.value("c_lidar"), "RECOVERED", "only monitors distinguish it from TRUE");
         robot.publish(&[status("ERROR")]);
         assert_eq!((robot.signal(0, status("TRUE")), robot.value("c_lidar")), (0, "ERROR"));
+    }
+
+    #[test]
+    fn a_measurement_is_repeated_after_its_believed_value_may_have_changed() {
+        let mut robot = Handled::new(&[]);
+        let statuses = [
+            monitor(MEASUREMENT, &[("battery", "0.2"), ("light", "9")]),
+            monitor(COMPONENT, &[("battery", "TRUE")]),
+        ];
+        assert_eq!((robot.publish(&statuses), robot.publish(&statuses)), (3, 0));
+        robot.queue.forget_measurements(|attribute| attribute == "battery");
+        assert_eq!(robot.publish(&statuses), 1, "only the measurement of the battery");
+        assert_eq!(robot.publish(&statuses), 0);
     }
 
     #[test]

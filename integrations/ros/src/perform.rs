@@ -53,6 +53,7 @@
 //! An action without a table ends immediately with success: its effects exist only in the plan.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use smol::channel;
 
@@ -117,7 +118,7 @@ impl Running {
     pub fn pair() -> (Self, Performance) {
         let (progress, events) = channel::unbounded();
         let (cancel, canceled) = channel::bounded(1);
-        (Self { events, cancel }, Performance { progress, canceled })
+        (Self { events, cancel }, Performance { progress, canceled, is_canceled: AtomicBool::new(false) })
     }
 
     /// Waits for the next message. The last message is [`Progress::Ended`].
@@ -138,6 +139,7 @@ impl Running {
 pub struct Performance {
     progress: channel::Sender<Progress>,
     canceled: channel::Receiver<()>,
+    is_canceled: AtomicBool,
 }
 
 impl Performance {
@@ -161,6 +163,12 @@ impl Performance {
         if self.canceled.recv().await.is_err() {
             futures::future::pending::<()>().await;
         }
+        self.is_canceled.store(true, Ordering::Relaxed);
+    }
+
+    /// Returns `true` if [`canceled`](Self::canceled) has returned.
+    pub(crate) fn is_canceled(&self) -> bool {
+        self.is_canceled.load(Ordering::Relaxed)
     }
 }
 

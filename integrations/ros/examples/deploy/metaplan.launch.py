@@ -1,4 +1,4 @@
-"""Starts metaplan-ros with a mission, in one of its roles, and starts it again when it ends.
+"""Starts metaplan-ros with a mission, in one of its roles, and starts it again when it ends, except the controller.
 
     ros2 launch metaplan.launch.py mission:=/opt/robot/suave.toml journal:=/var/lib/robot/journal
     ros2 launch metaplan.launch.py role:=planner params_file:=metaplan.yaml
@@ -44,8 +44,8 @@ def start(context):
             parameters=[value["params_file"]] if value["params_file"] else [],
             remappings=[("/diagnostics", value["diagnostics"])],
             output="screen",
-            # With a journal, the program resumes where it ended.
-            respawn=True,
+            # With a journal, the program resumes where it ended. A controller ends when its plan is executed.
+            respawn=value["role"] != "controller",
             respawn_delay=2.0,
         )
     ]

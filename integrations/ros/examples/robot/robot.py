@@ -1,7 +1,7 @@
 """A small robot of rclpy nodes for the tutorial docs/tutorial/ros-robot.md. It needs the wheels of requirements.txt and no ROS installation.
 
-The robot drives and takes pictures as `metaplan-ros --as manager` requests. Its nodes know nothing of Metaplan, except for `base`, which reads the
-requested actions from the topic of events.
+The robot drives and takes pictures as `metaplan-ros --as manager` requests. Its nodes know nothing of Metaplan, except for `base`, which reads from
+the topic of events which actions begin.
 """
 
 import argparse
@@ -107,33 +107,43 @@ class Base(Node):
     def __init__(self, controller: Controller, lidar: Lidar, failure: float | None) -> None:
         super().__init__("base")
         self.controller, self.lidar, self.failure = controller, lidar, failure
+        self.action: int | None = None
         self.arrived = self.create_publisher(Bool, "/arrived", 10)
         self.inspected = self.create_publisher(Bool, "/shelf/inspected", 10)
         self.create_subscription(String, "/metaplan/events", self.hear, 100)
 
     def hear(self, message: String) -> None:
-        """Starts a requested action in a thread of its own."""
+        """Begins an action in a thread of its own, and stops it. After a restart, the manager begins the present action again."""
         event = json.loads(message.data)
-        if event["answer"] == "request_action":
-            threading.Thread(target=self.perform, args=(event["name"], event["arguments"]), daemon=True).start()
+        if event["answer"] == "begin_action" and event["action"] != self.action:
+            self.action = event["action"]
+            threading.Thread(target=self.perform, args=(self.action, event["name"], event["arguments"]), daemon=True).start()
+        elif event["answer"] == "stop_action":
+            self.action = None
         elif event["answer"] == "goal_reached":
             say("the round is done")
 
-    def perform(self, action: str, arguments: list[str]) -> None:
-        """Performs an action and reports its end."""
+    def perform(self, number: int, action: str, arguments: list[str]) -> None:
+        """Performs an action, and reports its end unless it is stopped."""
         say(f"{action} {' '.join(arguments)}")
         if action == "inspect":
             time.sleep(2.0)
-            self.inspected.publish(Bool(data=True))
+            self.report(number, self.inspected)
             return
         if self.failure is not None:
             threading.Timer(self.failure, self.fail).start()
             self.failure = None
         distance = DISTANCES.get((arguments[0], arguments[1])) or DISTANCES[(arguments[1], arguments[0])]
-        while distance > 0:
+        while distance > 0 and self.action == number:
             time.sleep(0.1)
             distance -= 0.1 * self.controller.get_parameter("max_speed").value
-        self.arrived.publish(Bool(data=True))
+        self.report(number, self.arrived)
+
+    def report(self, number: int, done) -> None:
+        """Reports the end of an action that was not stopped."""
+        if self.action == number:
+            self.action = None
+            done.publish(Bool(data=True))
 
     def fail(self) -> None:
         """Breaks the lidar."""

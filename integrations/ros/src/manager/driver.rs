@@ -288,7 +288,13 @@ impl Driver {
         if self.node.is_logged(Severity::Debug) && !matches!(input, Input::Tick) {
             self.node.log(Severity::Debug, &format!("hears {input:?}"));
         }
-        for output in self.machine.handle(input, now)? {
+        // Effects of actions and facts of tasks set values that may have been measured before.
+        let sets_values = matches!(input, Input::Performed(..) | Input::Progress(..) | Input::Request(..));
+        let outputs = self.machine.handle(input, now)?;
+        if sets_values {
+            self.robot.forget_measurements(|attribute| self.machine.measures_value(attribute));
+        }
+        for output in outputs {
             match output {
                 Output::Change(change) => {
                     let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
@@ -297,8 +303,18 @@ impl Driver {
                 Output::Look(function) => self.robot.request_mode(&function),
                 Output::Probe(function, after) => self.robot.probe(&function, after),
                 Output::Reply(number, success) => self.robot.reply(number, success),
-                Output::Perform(number, call) => self.robot.perform(number, call),
-                Output::Stop(number) => self.robot.stop(number),
+                Output::Perform(number, call) => {
+                    let event = json!({
+                        "answer": "begin_action", "action": number, "name": call.action, "arguments": call.arguments,
+                    });
+                    self.robot.perform(number, call);
+                    // A robot that performs the action on this event may report its end at once.
+                    self.robot.event(&event);
+                }
+                Output::Stop(number) => {
+                    self.robot.event(&json!({"answer": "stop_action", "action": number}));
+                    self.robot.stop(number);
+                }
                 Output::Await(wait, time) => self.robot.await_end(wait, time),
                 Output::Plan(plan) => self.robot.plan(&plan),
                 Output::Event(event) => self.robot.event(&event),

@@ -35,6 +35,13 @@ const MODE_TIMEOUT: Duration = Duration::from_secs(2);
 /// Time after which an observation is repeated if a node was silent or in a transition, or steps were being executed.
 const OBSERVATION_DELAY: Duration = Duration::from_millis(500);
 
+/// Answer of the mode manager of `system_modes` while it cannot infer a function's mode.
+const UNKNOWN_MODE: &str = "unknown";
+
+/// Number of requests until [`UNKNOWN_MODE`] means that the function is in none of its modes. A mode manager that was
+/// just started has not received the states of the nodes yet.
+const MAX_UNKNOWN: u32 = 4;
+
 /// Number of mode requests to a new server, one per call of [`Robot::request_new_modes`]. The first ones may be lost
 /// before the server has discovered this node.
 const MAX_MODE_REQUESTS: u32 = 3;
@@ -169,8 +176,7 @@ impl Robot {
             async move {
                 let answer = match means {
                     Means::Modes { get_mode, .. } => {
-                        let answer = get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await;
-                        answer.map(|answer| answer.current_mode).map_err(|error| error.to_string())
+                        reported_mode(&get_mode).await.map_err(|error| error.to_string())
                     }
                     Means::Steps => match self.procedures.observe(&name).await {
                         Seen::Mode(mode) => Ok(mode),
@@ -305,8 +311,8 @@ impl Robot {
                 let get_mode = Arc::clone(get_mode);
                 smol::spawn(async move {
                     end_previous.await;
-                    if let Ok(answer) = get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await {
-                        let _ = inputs.send(Input::Mode(name, answer.current_mode));
+                    if let Ok(mode) = reported_mode(&get_mode).await {
+                        let _ = inputs.send(Input::Mode(name, mode));
                     }
                 })
             }
@@ -354,6 +360,10 @@ impl Robot {
 
     pub(super) fn diagnosed(&self) -> String {
         self.diagnosed.line()
+    }
+
+    pub(super) fn forget_measurements(&self, is_selected: impl Fn(&str) -> bool) {
+        self.diagnosed.forget_measurements(is_selected);
     }
 
     pub(super) fn reply(&self, number: u64, success: bool) {
@@ -444,6 +454,19 @@ impl Robot {
         let mut array = DiagnosticArray { status: vec![status], ..DiagnosticArray::default() };
         array.header.stamp = self.node.clock().stamp();
         self.diagnostics.publish(array);
+    }
+}
+
+/// Requests the mode of a function from its mode manager, and again while the mode manager does not know it.
+async fn reported_mode(get_mode: &Caller<GetMode>) -> Result<String, CallError> {
+    let mut requests = 0;
+    loop {
+        let mode = get_mode.call(GetModeRequest::default(), MODE_TIMEOUT).await?.current_mode;
+        requests += 1;
+        if mode != UNKNOWN_MODE || requests == MAX_UNKNOWN {
+            return Ok(mode);
+        }
+        Timer::after(OBSERVATION_DELAY).await;
     }
 }
 

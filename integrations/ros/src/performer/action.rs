@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use futures::FutureExt as _;
 use smol::Timer;
@@ -14,11 +14,14 @@ use crate::interfaces::suave_msgs::action::{
     SpiralSearchFeedback, SpiralSearchGoal, SpiralSearchResult,
 };
 use crate::interfaces::{Action, Service};
-use crate::node::{Accepted, ActionCaller, Caller, GoalEnd, Node, Pursued};
+use crate::node::{Accepted, ActionCaller, Caller, GoalEnd, GoalError, Node, Pursued};
 use crate::perform::{Call, End, Perform, Performance, Progress, Running};
 use crate::performer::{feedback, part};
 
 const SERVER_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Pause before a rejected goal is sent again. A server that was just started rejects goals until it is active.
+const REJECTED_PAUSE: Duration = Duration::from_secs(1);
 
 /// Time to wait for the answer to a goal whose action is cancelled. A goal without an answer in time is cancelled, too,
 /// but its end is not awaited.
@@ -100,6 +103,26 @@ async fn await_server<E: ToString>(
     smol::future::or(canceled, ready).await
 }
 
+/// Sends a goal, and again while the server rejects it, for [`SERVER_TIMEOUT`] or until the action is cancelled.
+async fn pursue<A: Action + 'static>(
+    caller: &ActionCaller<A>,
+    goal: &A::Goal,
+    performance: &Performance,
+) -> Result<Pursued<A>, GoalError> {
+    let start = Instant::now();
+    loop {
+        let answer = caller.pursue(goal.clone(), SERVER_TIMEOUT).await;
+        let is_rejected = matches!(answer, Err(GoalError::Rejected(_)));
+        if !is_rejected || start.elapsed() + REJECTED_PAUSE > SERVER_TIMEOUT {
+            return answer;
+        }
+        Timer::after(REJECTED_PAUSE).await;
+        if performance.is_canceled() {
+            return answer;
+        }
+    }
+}
+
 /// Sends a goal, and waits until the server accepts it. If the action is cancelled meanwhile, the goal is cancelled.
 pub(super) async fn send<A: Action + 'static>(
     caller: &ActionCaller<A>,
@@ -107,7 +130,7 @@ pub(super) async fn send<A: Action + 'static>(
     performance: &Performance,
 ) -> Result<Pursued<A>, End> {
     await_server(caller.ready(SERVER_TIMEOUT), performance).await?;
-    let mut pursuit = Box::pin(caller.pursue(goal, SERVER_TIMEOUT));
+    let mut pursuit = Box::pin(pursue(caller, &goal, performance));
     let canceled = async {
         performance.canceled().await;
         None
@@ -152,7 +175,10 @@ pub(super) async fn pursue_on<A: Action>(
                 Ok(Accepted::Ended(GoalEnd::Succeeded, result)) => {
                     return shortfall(&result).map_or(End::Succeeded, End::Failed);
                 }
-                Ok(Accepted::Ended(GoalEnd::Canceled, _)) => return End::Canceled,
+                Ok(Accepted::Ended(GoalEnd::Canceled, _)) if performance.is_canceled() => return End::Canceled,
+                Ok(Accepted::Ended(GoalEnd::Canceled, _)) => {
+                    return End::Failed("another client or its server has cancelled the goal".to_owned());
+                }
                 Ok(Accepted::Ended(GoalEnd::Aborted, result)) => {
                     let because = shortfall(&result).unwrap_or_else(|| "its server has aborted the goal".to_owned());
                     return End::Failed(because);

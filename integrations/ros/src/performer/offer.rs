@@ -122,7 +122,8 @@ impl Offer {
 
     fn handle(self: &Arc<Self>, message: &ActionExecution, node: &Node) {
         let mut stage = self.stage();
-        let is_for_us = message.node_id == self.hub.name();
+        // All offers of this process have the same node.
+        let is_for_us = message.node_id == self.hub.name() && message.action == self.action;
         match (message.r#type, &*stage) {
             // A busy performer does not respond.
             (ActionExecution::REQUEST, Stage::Running(..)) => {}

@@ -376,6 +376,18 @@ impl Keeping {
         }
     }
 
+    /// Handles a function that is in none of its modes after failed steps. Unless another design was requested instead,
+    /// its objectives need a design again.
+    pub(super) fn lose_design(&mut self, function: &str) {
+        for pursued in self.goals.values_mut().filter(|pursued| pursued.function == function) {
+            pursued.design = None;
+        }
+        if !self.pending.contains_key(function) {
+            let answers = self.keeper.lose_design(function);
+            self.handle_answers(answers);
+        }
+    }
+
     /// Retries failed designs whose delay has passed, and publishes the status of objectives.
     pub(super) fn tick(&mut self, now: Duration) {
         let due: Vec<String> = self

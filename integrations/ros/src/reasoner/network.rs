@@ -36,6 +36,8 @@ enum Input {
     Cancel(GoalId, CancelRequest),
     Diagnosed,
     Answered(Wanted, Outcome),
+    /// Steps of a function have failed, and it is in none of its modes.
+    InNoMode(String),
 }
 
 pub(super) struct Network {
@@ -205,6 +207,7 @@ impl Network {
                 self.keeping.handle_line(&line);
             }
             Input::Answered(wanted, outcome) => self.keeping.answered(&wanted, outcome, now),
+            Input::InNoMode(function) => self.keeping.lose_design(&function),
         }
     }
 
@@ -280,7 +283,11 @@ impl Network {
                 procedure::Outcome::Failed(because) => Outcome::StepFailed(because),
                 procedure::Outcome::Silent(because) => Outcome::Failed(because),
             };
-            let _ = sender.send(Input::Answered(wanted, outcome));
+            let is_lost = outcome != Outcome::Done && procedures.is_in_no_mode(&wanted.function);
+            let lost = is_lost.then(|| Input::InNoMode(wanted.function.clone()));
+            for input in [Some(Input::Answered(wanted, outcome)), lost].into_iter().flatten() {
+                let _ = sender.send(input);
+            }
         })
         .detach();
     }

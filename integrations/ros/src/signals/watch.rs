@@ -17,6 +17,7 @@ use crate::interfaces::lyrical::lifecycle_msgs::msg as lyrical;
 use crate::interfaces::rcl_interfaces::srv::GetParameters;
 use crate::node::{Caller, Clock, Node, PrimaryState, depth, is_lyrical};
 use crate::signals::settings::{Condition, Signal, Source, Target, number};
+use crate::types::{FieldPath, MessageType};
 
 /// Period of checks whether nodes exist and topics are silent.
 const CHECK_PERIOD: Duration = Duration::from_millis(250);
@@ -62,13 +63,8 @@ pub(crate) fn watch(node: &Arc<Node>, signals: &[Signal], report: &Report) -> Re
                 let last = Arc::new(Mutex::new(None));
                 let (noted, field) = (Arc::clone(&last), field.clone());
                 let of_message = reporter.clone();
-                let structure = Arc::clone(&kind.structure);
-                let read = Arc::new(move |message: Vec<u8>| {
-                    // Data of another definition measure nothing; their type hash has been reported.
-                    if let Ok(Some(value)) = structure.find(&field, &message, 0) {
-                        of_message.value(&value);
-                    }
-                });
+                let of_topic = Arc::clone(kind);
+                let read = Arc::new(move |message: Vec<u8>| of_message.field(&of_topic, &field, &message));
                 let samples = Arc::new(Mutex::new(Samples { every: *every, reported: None, skipped: None }));
                 tasks.extend(watch_skipped(node.clock(), &samples, Arc::clone(&read)));
                 let take = move |message: Vec<u8>, _| {
@@ -159,6 +155,15 @@ impl Reporter {
     fn works(&self, works: bool) {
         if let Target::Component { component, .. } = &self.target {
             self.send(COMPONENT, component, if works { WORKING } else { FAILED }.to_owned());
+        }
+    }
+
+    /// Reports the value of a field of a message. An element that a list does not have is treated as a number that is not
+    /// measured.
+    fn field(&self, kind: &MessageType, field: &FieldPath, message: &[u8]) {
+        // Data of another definition measure nothing; their type hash has been reported.
+        if let Ok(value) = kind.structure.find(field, message, 0) {
+            self.value(&value.unwrap_or_default());
         }
     }
 
@@ -371,9 +376,36 @@ fn watch_state(
 #[cfg(test)]
 mod tests {
     use std::collections::{BTreeSet, VecDeque};
+    use std::sync::{Arc, Mutex};
     use std::time::{Duration, Instant};
 
-    use super::{Arrivals, Samples, StateQueries};
+    use serde_json::json;
+
+    use super::{Arrivals, Reporter, Samples, Signal, Source, StateQueries};
+
+    #[test]
+    fn an_element_that_a_list_does_not_have_meets_no_condition() {
+        let text = "topic = \"/scan\"\ntype = \"sensor_msgs/msg/LaserScan\"\nfield = \"ranges[0]\"\n";
+        for (target, expected) in [
+            ("component = \"c\"\nat_least = 0.05", vec!["TRUE", "FALSE", "FALSE"]),
+            ("component = \"c\"\nperiod = 1.0", vec!["TRUE", "TRUE", "TRUE"]),
+            ("attribute = \"q\"", vec!["1.5"]),
+        ] {
+            let Signal { source, target, .. } = toml::from_str(&format!("{text}{target}")).expect("a signal");
+            let Source::Field { kind, field, .. } = source else { panic!("{source:?} is no field") };
+            let values = Arc::new(Mutex::new(Vec::new()));
+            let list = Arc::clone(&values);
+            let report = Arc::new(move |_: usize, status: super::DiagnosticStatus| {
+                list.lock().expect("no panic").extend(status.values.into_iter().map(|pair| pair.value));
+            });
+            let reporter = Reporter { index: 0, target, report };
+            for ranges in [json!([1.5]), json!([]), json!(["nan"])] {
+                let message = kind.structure.encode(&json!({"ranges": ranges})).expect("a message");
+                reporter.field(&kind, &field, &message);
+            }
+            assert_eq!(*values.lock().expect("no panic"), expected);
+        }
+    }
 
     #[test]
     fn arrivals_are_counted_within_the_period() {

@@ -11,8 +11,8 @@ use super::structure::{Layout, Structure};
 const INCOMPLETE: &str = "the data end too early: the definition differs from that of the sender";
 
 impl Structure {
-    /// Returns the value of a field, or `None` for an element that a list does not have. NaN and infinite numbers are
-    /// null. `offset` is the number of bytes of the message that precede `data`; the alignment depends on it.
+    /// Returns the value of a field, or `None` for an element that a list does not have. NaN is null, and an infinite
+    /// number is the text `inf` or `-inf`. `offset` is the number of bytes of the message that precede `data`; the alignment depends on it.
     ///
     /// # Errors
     /// The data are no message of this structure.
@@ -124,8 +124,8 @@ impl Reader<'_> {
             Primitive::Uint32 => u32::from_le_bytes(self.aligned()?).into(),
             Primitive::Int64 => i64::from_le_bytes(self.aligned()?).into(),
             Primitive::Uint64 => u64::from_le_bytes(self.aligned()?).into(),
-            Primitive::Float32 => f32::from_le_bytes(self.aligned()?).into(),
-            Primitive::Float64 => f64::from_le_bytes(self.aligned()?).into(),
+            Primitive::Float32 => float(f32::from_le_bytes(self.aligned()?)),
+            Primitive::Float64 => float(f64::from_le_bytes(self.aligned()?)),
             Primitive::String => return Err(INCOMPLETE.to_owned()),
         })
     }
@@ -156,6 +156,18 @@ impl Reader<'_> {
         let size = primitive.size();
         self.align(size);
         self.take(count.checked_mul(size).ok_or(INCOMPLETE)?).map(|_| ())
+    }
+}
+
+/// Converts a floating-point number, so that equal numbers have equal values: zero without a sign.
+fn float<F: Copy + Into<f64> + Into<Value>>(number: F) -> Value {
+    let double: f64 = number.into();
+    if double == 0.0 {
+        Value::from(0.0)
+    } else if double.is_infinite() {
+        Value::from(if double > 0.0 { "inf" } else { "-inf" })
+    } else {
+        number.into()
     }
 }
 

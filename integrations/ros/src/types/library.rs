@@ -387,6 +387,32 @@ mod tests {
     }
 
     #[test]
+    fn expected_numbers_are_compared_as_numbers() {
+        let structure =
+            library(&[("p/msg/M", "float32 a\nfloat64 b")]).message("p/msg/M").expect("it").structure;
+        let values = [
+            (json!("-inf"), f64::NEG_INFINITY),
+            (json!(-0.5), -0.5),
+            (json!(-0.0), -0.0),
+            (json!(0), 0.0),
+            (json!(0.5), 0.5),
+            (json!("inf"), f64::INFINITY),
+            (json!("nan"), f64::NAN),
+        ];
+        for (value, expected) in &values {
+            for (_, present) in &values {
+                let data = encoded(&(*present as f32, *present));
+                let is_met = expected == present || expected.is_nan() && present.is_nan();
+                for field in ["a", "b"] {
+                    let expectation = Expectation::new(&structure, &json!({field: value})).expect("a field");
+                    let result = expectation.check(&structure, &data, 0);
+                    assert_eq!(result.is_ok(), is_met, "{expected} {present}: {result:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn default_values_are_those_of_the_definition() {
         let text = "float32 a 0.5\nstring b \"x, y\"\nint8[2] c [1, -2]\nstring[] d ['a, b', c]\nuint8 e 0xff\nbool f true";
         let library = library(&[("p/msg/M", text)]);

@@ -201,6 +201,54 @@ fn a_goal_is_cancelled_without_an_answer() {
 }
 
 #[test]
+fn a_goal_that_was_not_cancelled_on_request_has_failed() {
+    use nav2_msgs::action::{NavigateToPose, NavigateToPoseFeedback, NavigateToPoseResult};
+
+    let domain = domain();
+    let robot = node(domain, "robot", "");
+    serve::<NavigateToPose>(&robot, "/navigate_to_pose", NavigateToPoseFeedback::default(), |_| {
+        Some((GoalEnd::Canceled, NavigateToPoseResult::default()))
+    });
+    let (_manager, cast) = cast(domain, SETTINGS);
+    let (_, end) = hear(&cast.start(call("(move r1 kitchen hall)")));
+    assert!(matches!(&end, End::Failed(because) if because.contains("another client")), "{end:?}");
+}
+
+#[test]
+fn a_rejected_goal_is_sent_again_until_the_action_is_cancelled() {
+    use nav2_msgs::action::{NavigateToPose, NavigateToPoseResult};
+
+    let domain = domain();
+    let robot = node(domain, "robot", "");
+    let (sender, events) = smol::channel::unbounded();
+    let goals = robot
+        .serve_action::<NavigateToPose>("/navigate_to_pose", move |event| {
+            sender.try_send(event).expect("the test receives");
+        })
+        .expect("an action");
+    let wanted = || {
+        until("a goal", || !events.is_empty());
+        match events.try_recv() {
+            Ok(GoalEvent::Wanted(wanted, _)) => wanted,
+            _ => panic!("no goal is cancelled"),
+        }
+    };
+    let (_manager, cast) = cast(domain, SETTINGS);
+    let running = cast.start(call("(move r1 kitchen hall)"));
+    goals.reject(wanted());
+    let goal = goals.accept(wanted());
+    goals.finish(goal, GoalEnd::Succeeded, NavigateToPoseResult::default());
+    assert_eq!(hear(&running).1, End::Succeeded);
+    let running = cast.start(call("(move r1 kitchen hall)"));
+    goals.reject(wanted());
+    goals.reject(wanted());
+    running.cancel();
+    assert_eq!(hear(&running).1, End::Canceled);
+    std::thread::sleep(Duration::from_millis(1500));
+    assert!(events.is_empty(), "nothing is sent after the cancellation");
+}
+
+#[test]
 fn a_result_of_another_version_ends_the_action() {
     use humble::nav2_msgs::action::{NavigateToPose, NavigateToPoseFeedback, NavigateToPoseResult};
 
@@ -307,6 +355,42 @@ fn actions_go_over_the_hub() {
         ActionExecution::CANCEL,
     ];
     assert_eq!(said, BTreeSet::from(all));
+}
+
+#[test]
+fn only_the_confirmed_one_of_two_offered_actions_begins() {
+    let domain = domain();
+    let (performer, executor) = (node(domain, "performer", ""), node(domain, "executor", ""));
+    let offered = ["light", "search"].map(|action| {
+        let begun = Arc::new(Mutex::new(Vec::new()));
+        let own = Own { begun: Arc::clone(&begun) };
+        offer(&performer, action, Vec::new(), Arc::new(own)).expect("an offer");
+        begun
+    });
+    let (responses, list) = (Arc::new(Mutex::new(BTreeSet::new())), Arc::new(Mutex::new(Vec::new())));
+    let (noted, finished) = (Arc::clone(&responses), Arc::clone(&list));
+    executor
+        .subscribe::<ActionExecution>("/actions_hub", depth(100), move |message| match message.r#type {
+            ActionExecution::RESPONSE => _ = noted.lock().expect("no panic").insert(message.action),
+            ActionExecution::FINISH => finished.lock().expect("no panic").push(message.action),
+            _ => {}
+        })
+        .expect("a subscription");
+    let hub = executor.publisher::<ActionExecution>("/actions_hub", depth(100)).expect("a topic");
+    let send = |r#type: i16, action: &str| {
+        let (node_id, arguments) = ("performer".to_owned(), vec!["r1".to_owned()]);
+        let action = action.to_owned();
+        hub.publish(ActionExecution { r#type, node_id, action, arguments, ..ActionExecution::default() });
+    };
+    until("both respond", || {
+        send(ActionExecution::REQUEST, "light");
+        send(ActionExecution::REQUEST, "search");
+        responses.lock().expect("no panic").len() == 2
+    });
+    send(ActionExecution::CONFIRM, "search");
+    until("the search is finished", || !list.lock().expect("no panic").is_empty());
+    assert_eq!(*list.lock().expect("no panic"), ["search"]);
+    assert_eq!(offered.map(|begun| begun.lock().expect("no panic").len()), [0, 1]);
 }
 
 /// PlanSys2's executor requests an action that the settings offer. The action changes a mode.

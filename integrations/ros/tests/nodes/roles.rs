@@ -10,6 +10,7 @@ use std::time::Duration;
 use metaplan::message::Errors;
 use metaplan_ros::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use metaplan_ros::interfaces::mros2_msgs::action::{ControlQos, ControlQosGoal};
+use metaplan_ros::interfaces::rcl_interfaces::msg::ParameterEvent;
 use metaplan_ros::interfaces::std_msgs::msg::{Bool, String as Text};
 use metaplan_ros::interfaces::suave_msgs::srv::{Task, TaskRequest};
 use metaplan_ros::interfaces::system_modes_msgs::srv::{
@@ -18,6 +19,7 @@ use metaplan_ros::interfaces::system_modes_msgs::srv::{
 use metaplan_ros::node::{Accepted, Declared, GoalEnd, Node, Publisher, depth, keep_all};
 use metaplan_ros::{manager, reasoner};
 use ros2_client::ParameterValue;
+use serde_json::Value;
 use smol::block_on;
 
 use crate::common::{domain, node, until};
@@ -178,6 +180,69 @@ fn a_manager_searches_adapts_restarts_and_inspects() {
     for word in ["plan_found", "IDLE", "RECONFIGURE", "EXECUTE", "did you mean"] {
         assert!(events.contains(word), "{word} is not among the events");
     }
+}
+
+#[test]
+fn a_measurement_corrects_the_effect_of_an_action() {
+    let domain = domain();
+    let robot = Robot::new(domain, None);
+    let events: Arc<Mutex<Vec<Value>>> = Arc::default();
+    let heard = Arc::clone(&events);
+    robot
+        .node
+        .subscribe::<Text>("/metaplan/events", depth(100), move |event| {
+            heard.lock().expect("no panic").push(serde_json::from_str(&event.data).expect("JSON"));
+        })
+        .expect("a topic");
+    let running = manager(domain, None);
+    let request = robot.node.caller::<Task>("/task/request");
+    let task = || TaskRequest { task_name: "search_pipeline".to_owned() };
+    until("the search is granted", || block_on(request.call(task(), LONG)).expect("an answer").success);
+    let recharged = robot.node.publisher("/battery_monitor/recharge/complete", depth(10)).expect("a topic");
+    // The charger has no contact, so that the level stays low.
+    for _ in 0..2 {
+        until("the robot recharges", || {
+            robot.measure("battery_level", "0.2");
+            std::thread::sleep(Duration::from_millis(50));
+            robot.mode("generate_recharge_path") == "normal"
+        });
+        until("the search continues", || {
+            recharged.publish(Bool { data: true });
+            std::thread::sleep(Duration::from_millis(20));
+            robot.mode("f_generate_search_path") == "fd_spiral_high"
+        });
+    }
+    running.end().expect("it ends as it should");
+    let events = events.lock().expect("no panic");
+    let of_kind = |kind: &str| events.iter().filter(|event| event["answer"] == kind).collect::<Vec<_>>();
+    let names: Vec<&Value> = of_kind("begin_action").into_iter().map(|event| &event["name"]).collect();
+    assert_eq!(names, ["search_pipeline", "recharge", "search_pipeline", "recharge", "search_pipeline"]);
+    let stopped: Vec<&Value> = of_kind("stop_action").into_iter().map(|event| &event["action"]).collect();
+    assert_eq!(stopped, [1, 3]);
+}
+
+#[test]
+fn a_function_keeps_its_design_while_its_mode_manager_does_not_know_the_mode() {
+    let (domain, path) = (domain(), "f_generate_search_path");
+    let robot = Robot::new(domain, None);
+    let running = manager(domain, None);
+    let request = robot.node.caller::<Task>("/task/request");
+    let task = || TaskRequest { task_name: "search_pipeline".to_owned() };
+    until("the search is granted", || block_on(request.call(task(), LONG)).expect("an answer").success);
+    // A granted mode is assumed for 2 s.
+    std::thread::sleep(Duration::from_millis(2500));
+    let set = |mode: &str| robot.modes.lock().expect("no panic").insert(path.to_owned(), mode.to_owned());
+    let parameters = robot.node.publisher::<ParameterEvent>("/parameter_events", depth(10)).expect("a topic");
+    let changes = robot.asked.lock().expect("no panic").len();
+    assert_eq!(set("unknown").as_deref(), Some("fd_spiral_high"));
+    for _ in 0..6 {
+        parameters.publish(ParameterEvent { node: format!("/{path}_node"), ..ParameterEvent::default() });
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    set("fd_spiral_high");
+    std::thread::sleep(Duration::from_secs(2));
+    assert_eq!(robot.asked.lock().expect("no panic").len(), changes, "no mode is requested");
+    running.end().expect("it ends as it should");
 }
 
 #[test]

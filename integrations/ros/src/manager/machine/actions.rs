@@ -9,7 +9,7 @@ use crate::manager::machine::io::{Ended, Output};
 
 impl Machine {
     /// Starts the requested action if its functions have the required designs, no mode request is pending,
-    /// and the action is neither suspended nor being cancelled.
+    /// the action is neither suspended nor being cancelled, and the autopilot accepts commands.
     pub(super) fn begin(&mut self) {
         let beliefs = self.control.beliefs();
         let has = |(function, design): &(String, String)| {
@@ -17,7 +17,8 @@ impl Machine {
         };
         let is_ready = beliefs.running().is_some_and(|(_, step)| step.configuration.iter().all(has))
             && !beliefs.suspended()
-            && !beliefs.cancelling();
+            && !beliefs.cancelling()
+            && self.autopilot_obeys;
         if !self.pending.is_empty() || !is_ready {
             return;
         }
@@ -31,11 +32,12 @@ impl Machine {
         }
     }
 
-    /// Ends the action under way if the loop has suspended it. Performers cannot pause, and an action that goes on
-    /// would move the robot without its designs. The performer reports the action as cancelled.
-    pub(super) fn stop_suspended(&mut self) {
-        let is_suspended = self.control.beliefs().suspended();
-        if let Some(action) = self.action.as_mut().filter(|action| is_suspended && action.begun)
+    /// Ends the action under way if the loop has suspended it, or if the autopilot no longer accepts commands.
+    /// Performers cannot pause, and an action that goes on would move the robot without its designs or against the
+    /// pilot. The performer reports the action as cancelled.
+    pub(super) fn stop_interrupted(&mut self) {
+        let is_interrupted = self.control.beliefs().suspended() || !self.autopilot_obeys;
+        if let Some(action) = self.action.as_mut().filter(|action| is_interrupted && action.begun)
             && !std::mem::replace(&mut action.is_stopped, true)
         {
             self.outputs.push(Output::Stop(action.number));

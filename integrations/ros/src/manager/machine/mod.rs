@@ -82,7 +82,10 @@ pub(super) struct Machine {
     end_requests: Vec<u64>,
     failures: BTreeMap<String, CallFailures>,
     without_plan: bool,
-    autopilot_obeyed: bool,
+    /// `false` if the autopilot has last reported another mode than the one in which it accepts commands.
+    autopilot_obeys: bool,
+    /// `true` if an action was requested since the goal was last reached.
+    has_acted: bool,
     deferred: Option<Deferred>,
     transient_states: Vec<State>,
     outputs: Vec<Output>,
@@ -116,7 +119,8 @@ impl Machine {
             end_requests: Vec::new(),
             failures: BTreeMap::new(),
             without_plan: false,
-            autopilot_obeyed: false,
+            autopilot_obeys: true,
+            has_acted: false,
             deferred: None,
             transient_states: Vec::new(),
             outputs: Vec::new(),
@@ -141,6 +145,13 @@ impl Machine {
         &self.functions
     }
 
+    /// Returns `true` if the measured value of an attribute is the value of a function of the problem.
+    pub(super) fn measures_value(&self, attribute: &str) -> bool {
+        let mission = self.control.beliefs().mission();
+        let (_, name) = attribute.rsplit_once(['#', '/']).unwrap_or(("", attribute));
+        mission.is_function(attribute) || !mission.fed_by(name).is_empty()
+    }
+
     pub(super) fn modes_of(&self, function: &str) -> Vec<String> {
         let designs = self.control.beliefs().mission().designs_of(function);
         designs.iter().map(|design| self.settings.functions.mode(function, design).to_owned()).collect()
@@ -153,8 +164,13 @@ impl Machine {
     pub(super) fn handle(&mut self, input: Input, now: Duration) -> Result<Vec<Output>, Message> {
         self.now = now;
         let is_over = self.deferred.as_ref().is_some_and(|deferred| deferred.until <= now);
+        let concerns_task = match &input {
+            Input::Request(..) | Input::Cancel(..) => true,
+            Input::Autopilot(mode) => !self.accepts_commands(mode),
+            _ => false,
+        };
         // Deferred work precedes new requests.
-        if is_over || matches!(input, Input::Request(..) | Input::Cancel(..)) {
+        if is_over || concerns_task {
             self.catch_up();
             self.settle()?;
         }
@@ -191,7 +207,7 @@ impl Machine {
             self.begin();
         }
         self.settle()?;
-        self.stop_suspended();
+        self.stop_interrupted();
         self.enter(&because)?;
         Ok(std::mem::take(&mut self.outputs))
     }
@@ -320,6 +336,7 @@ impl Machine {
                 for function in &idle {
                     self.unground(function);
                 }
+                self.has_acted = true;
                 self.action = Some(Action {
                     number: effect.action,
                     call,

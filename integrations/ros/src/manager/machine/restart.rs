@@ -71,6 +71,7 @@ impl Machine {
         let call = call(step);
         let is_waiting = |effect: &&Effect| matches!(effect.command, Command::Request { .. });
         let effect = self.control.beliefs().outstanding().find(is_waiting).map(|effect| effect.number);
+        self.has_acted = true;
         self.action = Some(Action { number, call, effect, begun: false, is_lost: true, is_stopped: false });
     }
 

@@ -41,9 +41,13 @@ impl Machine {
             self.refuse(&because);
             return because;
         };
-        if self.state == State::WaitGraph {
+        let obstacle = match self.state {
+            State::WaitGraph => Some("functions are missing"),
+            _ => (!self.autopilot_obeys).then_some("the autopilot accepts no commands in its mode"),
+        };
+        if let Some(obstacle) = obstacle {
             self.outputs.push(Output::Reply(number, false));
-            let because = format!("the task {task} is requested, and functions are missing");
+            let because = format!("the task {task} is requested, and {obstacle}");
             self.refuse(&because);
             return because;
         }
@@ -72,8 +76,12 @@ impl Machine {
             self.refuse(&because);
             return because;
         }
-        if self.task.as_deref().is_some_and(|current| current != task) {
-            // Another task is running, so the cancelled task is not.
+        let beliefs = self.control.beliefs();
+        let pursues_goal_of_problem = self.task.is_none()
+            && beliefs.goal().is_none()
+            && (beliefs.running().is_some() || self.without_plan);
+        if pursues_goal_of_problem || self.task.as_deref().is_some_and(|current| current != task) {
+            // The mission or another task is running, so the cancelled task is not.
             self.outputs.extend(number.map(|number| Output::Reply(number, true)));
             return format!("the task {task} is not under way");
         }
@@ -134,8 +142,9 @@ impl Machine {
 
     pub(super) fn reached(&mut self) {
         self.without_plan = false;
-        let was_active = self.action.take().is_some();
-        if self.task.take().is_none() && !was_active {
+        self.action = None;
+        let has_acted = std::mem::take(&mut self.has_acted);
+        if self.task.take().is_none() && !has_acted {
             return;
         }
         for number in std::mem::take(&mut self.start_requests) {
@@ -147,16 +156,17 @@ impl Machine {
         self.unground_all();
     }
 
+    pub(super) fn accepts_commands(&self, mode: &str) -> bool {
+        self.settings.autopilot.as_ref().is_none_or(|autopilot| autopilot.mode == mode)
+    }
+
+    /// Ends the task if the autopilot accepts no commands in its mode. A mission with its own goal has no task: its action
+    /// is stopped, and the next one waits.
     pub(super) fn autopilot(&mut self, mode: &str) -> String {
-        let obeys = self.settings.autopilot.as_ref().is_some_and(|autopilot| autopilot.mode == mode);
-        let had_obeyed = std::mem::replace(&mut self.autopilot_obeyed, obeys);
-        let because = format!("the autopilot is in the mode {mode}");
-        match self.task.clone() {
-            Some(task) if had_obeyed && !obeys => {
-                self.cancel(None, &task);
-                because
-            }
-            _ => because,
+        self.autopilot_obeys = self.accepts_commands(mode);
+        if let Some(task) = self.task.clone().filter(|_| !self.autopilot_obeys) {
+            self.cancel(None, &task);
         }
+        format!("the autopilot is in the mode {mode}")
     }
 }

@@ -104,6 +104,16 @@ impl Robot {
         self.handle(Input::Cancel(8, task.to_owned()))
     }
 
+    fn autopilot(&mut self, mode: &str) -> Vec<Output> {
+        self.handle(Input::Autopilot(mode.to_owned()))
+    }
+
+    fn report(&mut self, component: &str, status: &str) -> Vec<Output> {
+        self.handle(Input::Line(format!(
+            r#"{{"event":"component_status","component":"{component}","status":"{status}"}}"#
+        )))
+    }
+
     fn measure(&mut self, attribute: &str, value: &str) -> Vec<Output> {
         self.handle(Input::Line(format!(
             r#"{{"event":"measured","attribute":"{attribute}","value":{value}}}"#
@@ -421,13 +431,84 @@ fn a_task_ends_when_the_autopilot_no_longer_obeys() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
-    assert_eq!(robot.handle(Input::Autopilot("GUIDED".to_owned())), []);
-    let outputs = robot.handle(Input::Autopilot("MANUAL".to_owned()));
-    assert_eq!(outputs, STOP);
+    assert_eq!(robot.autopilot("GUIDED"), []);
+    assert_eq!(robot.autopilot("MANUAL"), STOP);
     let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     robot.obey(outputs);
     assert_eq!(robot.machine.state(), State::Idle);
+    // In this mode, no task is granted.
+    let outputs = robot.request("search_pipeline");
+    assert!(matches!(&outputs[..], [Output::Reply(7, false), Output::Warn(_)]), "{outputs:?}");
+    robot.autopilot("GUIDED");
+    let outputs = robot.request("search_pipeline");
+    assert_eq!(performed(&robot.obey(outputs)), ["search_pipeline"]);
+}
+
+#[test]
+fn a_task_ends_if_the_autopilot_has_left_its_mode_during_a_restart() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut robot = Robot::new(Some(directory.path()));
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    drop(robot);
+    let mut robot = Robot::restarted(directory.path());
+    robot.ready(searching);
+    let outputs = robot.autopilot("MANUAL");
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+    assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
+    assert_eq!((robot.machine.state(), robot.machine.task()), (State::Idle, None));
+}
+
+/// Creates a machine for the goal of a problem, and returns it with the outputs of its start. Its settings have a task
+/// and an autopilot, too.
+fn with_goal_of_problem() -> (Robot, Vec<Output>) {
+    let autopilot = "[autopilot]\ntopic = \"/state\"\nmode = \"GUIDED\"\n";
+    let task = "[tasks.round]\ngoal = \"(inspected shelf_1)\"\n";
+    let settings = extended("nav2/mission.toml", &[autopilot, task].concat());
+    let mut robot = Robot::waiting(control_of("nav2/mission.toml").0, settings, None);
+    let outputs = robot.ready(|_| "fd_unground");
+    (robot, outputs)
+}
+
+#[test]
+fn no_action_begins_while_the_autopilot_does_not_obey() {
+    let (mut robot, outputs) = with_goal_of_problem();
+    assert_eq!(performed(&robot.obey(outputs)), ["move"]);
+    assert_eq!(robot.autopilot("MANUAL"), [Output::Stop(1)]);
+    assert_eq!(robot.autopilot("MANUAL"), [], "it is stopped once");
+    let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
+    assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
+    assert_eq!(performed(&robot.autopilot("GUIDED")), ["move"]);
+}
+
+#[test]
+fn functions_are_not_needed_after_the_goal_of_the_problem_is_reached() {
+    let (mut robot, mut outputs) = with_goal_of_problem();
+    let mut actions = 0;
+    while performed(&robot.obey(outputs)).len() == 1 {
+        actions += 1;
+        outputs = robot.handle(Input::Performed(actions, Ended::Succeeded));
+    }
+    assert_eq!((actions, robot.machine.state()), (7, State::Idle));
+    let modes = &robot.machine.modes;
+    assert!(modes.values().all(|mode| mode == "fd_unground"), "{modes:?}");
+}
+
+#[test]
+fn the_cancellation_of_a_task_does_not_concern_the_goal_of_the_problem() {
+    let (mut robot, outputs) = with_goal_of_problem();
+    robot.obey(outputs);
+    assert_eq!(robot.cancel("round"), [Output::Reply(8, true)]);
+    assert_eq!(robot.machine.state(), State::Execute);
+    for component in ["c_lidar", "c_camera"] {
+        let outputs = robot.report(component, "FALSE");
+        robot.obey(outputs);
+    }
+    robot.handle(Input::Performed(1, Ended::Cancelled));
+    assert_eq!(robot.machine.state(), State::Degraded);
+    assert_eq!(robot.cancel("round"), [Output::Reply(8, true)]);
+    assert_eq!(robot.machine.state(), State::Degraded);
 }
 
 #[test]
@@ -482,18 +563,13 @@ fn searching(function: &str) -> &'static str {
 fn a_degraded_robot_goes_on_when_a_component_has_healed() {
     let (control, settings) = control_of("nav2/mission.toml");
     let mut robot = Robot::with(control, settings, None, |_| "fd_unground");
-    let report = |component: &str, status: &str| {
-        Input::Line(format!(
-            r#"{{"event":"component_status","component":"{component}","status":"{status}"}}"#
-        ))
-    };
     for component in ["c_lidar", "c_camera"] {
-        robot.handle(report(component, "FALSE"));
+        robot.report(component, "FALSE");
         let pending: Vec<Output> = robot.machine.pending.values().cloned().map(Output::Change).collect();
         robot.obey(pending);
     }
     assert_eq!(robot.machine.state(), State::Degraded);
-    robot.handle(report("c_lidar", "TRUE"));
+    robot.report("c_lidar", "TRUE");
     assert_eq!(robot.machine.state(), State::Degraded, "the report must last");
     robot.now += Duration::from_secs(3);
     let outputs = robot.handle(Input::Tick);
@@ -601,20 +677,25 @@ fn an_action_is_performed_after_a_restart_once_its_functions_have_their_designs(
     }
 }
 
+/// Reads the settings of an example with further tables.
+fn extended(example: &str, tables: &str) -> Settings {
+    let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(example);
+    let text = std::fs::read_to_string(mission.with_file_name("ros.toml")).expect("settings");
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("ros.toml");
+    std::fs::write(&file, format!("{text}\n{tables}")).expect("written");
+    Settings::read(Some(&file), &mission).expect("settings")
+}
+
 /// Creates a machine whose spiral has steps for its designs, but none for the time when it is not needed.
 fn with_steps() -> Robot {
-    let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/suave/suave.toml");
-    let (control, _) = control();
-    let mut text = std::fs::read_to_string(mission.with_file_name("ros.toml")).expect("settings");
+    let mut text = String::new();
     for design in ["fd_spiral_high", "fd_spiral_medium", "fd_spiral_low"] {
         let step = format!("{{ node = \"/{design}\", state = \"active\" }}");
         text.extend([format!("\n[functions.{PATH}.designs.{design}]\nsteps = [{step}]\n")]);
     }
-    let directory = tempfile::tempdir().expect("a directory");
-    let file = directory.path().join("ros.toml");
-    std::fs::write(&file, text).expect("written");
-    let settings = Settings::read(Some(&file), &mission).expect("settings");
-    Robot::with(control, settings, None, |function| if function == PATH { "" } else { "fd_unground" })
+    let settings = extended("suave/suave.toml", &text);
+    Robot::with(control().0, settings, None, |function| if function == PATH { "" } else { "fd_unground" })
 }
 
 #[test]

@@ -268,6 +268,10 @@ impl<A: Action + 'static> Connection<A> {
         // The lock is held so that the answer cannot be received before the goal is registered.
         let mut goals = self.goals();
         let is_first = goals.is_empty();
+        if is_first {
+            // It belonged to one of the earlier goals.
+            goals.malformed = None;
+        }
         let (request, goal) = self.client.send_goal(goal)?;
         let since = Instant::now();
         goals.unanswered.push(Unanswered { request, goal, since, answer, is_cancelled: false });

@@ -93,6 +93,27 @@ fn a_design_that_is_refused_is_replaced_and_tried_again() {
 }
 
 #[test]
+fn a_design_is_requested_again_after_steps_that_were_not_undone() {
+    for is_undone in [true, false] {
+        let (mut keeping, goal) = (keeping(), GoalId::new_random());
+        keeping.pursue(goal, &wanted(PATH));
+        let first = requested_modes(&mut keeping);
+        keeping.answered(&first[0], Outcome::Done, NOW);
+        let darker = see(&mut keeping, "1.3");
+        assert_eq!(modes(&darker), ["fd_spiral_low"]);
+        keeping.answered(&darker[0], Outcome::StepFailed("it is stuck".to_owned()), NOW);
+        if !is_undone {
+            keeping.lose_design(PATH);
+        }
+        assert_eq!(requested_modes(&mut keeping), [], "no other spiral can be flown in the dark");
+        let design = is_undone.then(|| "fd_spiral_high".to_owned());
+        assert_eq!(keeping.memory().goals[0].design, design);
+        let expected = if is_undone { &[][..] } else { &["fd_spiral_high"] };
+        assert_eq!(modes(&see(&mut keeping, "4")), expected);
+    }
+}
+
+#[test]
 fn a_design_required_during_a_cancellation_does_not_replace_it() {
     for outcome in [Outcome::Done, Outcome::Refused] {
         let (mut keeping, goal) = (keeping(), GoalId::new_random());
