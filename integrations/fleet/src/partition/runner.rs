@@ -19,7 +19,7 @@ use crate::wire::{Address, Decided};
 /// Time without an event or a plan after which a robot is removed from memory.
 const MAX_IDLE: Duration = Duration::from_secs(600);
 
-/// Reason for a suspension: work on the robot has panicked, or the thread of a search could not be started.
+/// Reason for a suspension: work on the robot has panicked.
 const PANICKED: &str = "its loop has panicked";
 
 pub(super) struct Count(Arc<AtomicU64>);
@@ -64,8 +64,7 @@ fn panicked() -> Outcome {
     Outcome::Undecided(Undecided::Faulted(PANICKED.to_owned()))
 }
 
-/// The plans of a search and the new estimate of the duration of a search. `None` if the search has panicked or could
-/// not be started.
+/// The plans of a search and the new estimate of the duration of a search. `None` if the search has panicked.
 type Plans = Option<(Thoughts, Duration)>;
 
 /// A search for a plan that continues after the decision.

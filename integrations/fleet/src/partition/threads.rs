@@ -8,11 +8,14 @@
 //! processors among the threads; those of the longer classes have a lower priority.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio::sync::{Semaphore, SemaphorePermit, oneshot};
+
+use super::pause;
 
 /// Maximum durations of the searches of each class but the last one, which has no maximum. The second class is for
 /// short searches on a busy machine.
@@ -52,7 +55,7 @@ impl Threads {
     }
 
     /// Runs a search. `estimate` is the expected duration, if the robot has searched before. Also
-    /// returns the [new estimate](updated). Returns `None` if the thread has panicked or could not be started.
+    /// returns the [new estimate](updated). Returns `None` if the thread has panicked.
     pub(crate) async fn search<T: Send + 'static>(
         &self,
         mission: &str,
@@ -70,8 +73,20 @@ impl Threads {
             // The receiver is gone if the partition was given back.
             let _ = send.send((work(), begun.elapsed()));
         };
-        // A thread of its own, because a thread cannot raise its priority again.
-        std::thread::Builder::new().name("search".to_owned()).spawn(timed).ok()?;
+        // A thread of its own, because a thread cannot raise its priority again. An attempt that fails drops its closure,
+        // so the work is outside.
+        let slot = Arc::new(Mutex::new(Some(timed)));
+        start(|| {
+            let slot = Arc::clone(&slot);
+            let run = move || {
+                let timed = slot.lock().unwrap_or_else(PoisonError::into_inner).take();
+                if let Some(timed) = timed {
+                    timed();
+                }
+            };
+            std::thread::Builder::new().name("search".to_owned()).spawn(run).map(|_| ())
+        })
+        .await;
         let limit = MAX_DURATIONS.get(class).copied().unwrap_or(Duration::MAX);
         let (result, duration) = if let Ok(done) = tokio::time::timeout(limit, &mut outcome).await {
             done.ok()?
@@ -106,6 +121,15 @@ impl Threads {
             *cost = updated(*cost, duration);
         }
         *cost
+    }
+}
+
+/// Starts a thread, with further attempts as long as the operating system refuses it, such as at a limit on threads.
+async fn start(mut spawn: impl FnMut() -> io::Result<()>) {
+    for attempt in 1.. {
+        let Err(error) = spawn() else { return };
+        tracing::warn!("the thread of a search cannot be started, and the start is repeated: {error}");
+        pause(attempt).await;
     }
 }
 
@@ -176,6 +200,17 @@ mod tests {
         };
         tokio::time::timeout(Duration::from_secs(600), short).await.expect("no wait for long searches");
         drop(holds);
+    }
+
+    #[tokio::test]
+    async fn a_refused_thread_is_started_later() {
+        let mut attempts = 0;
+        start(|| {
+            attempts += 1;
+            if attempts < 3 { Err(io::ErrorKind::WouldBlock.into()) } else { Ok(()) }
+        })
+        .await;
+        assert_eq!(attempts, 3);
     }
 
     #[test]
