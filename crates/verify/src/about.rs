@@ -31,6 +31,11 @@ pub(crate) fn about(
     let origin: Origin =
         serde_json::from_str(certified.origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
     let sources = base.sources();
+    if !sources.are_repeatable() {
+        return Err(
+            "the mission's knowledge base comes from standard input, which cannot be read again".to_owned()
+        );
+    }
     let (document, _) = ontology::convert_files(&sources.documents, &sources.options, OutputSyntax::NTriples)
         .map_err(|_| "the mission's knowledge base cannot be read again".to_owned())?;
     let texts = sources.rules.iter().map(|name| rule_text(name)).collect::<Result<Vec<_>, _>>();
