@@ -83,6 +83,15 @@ fn plans_before_and_after_are_compared_with_reasons() {
 
 /// The plan of the current situation must not use up the time for the plan before.
 #[test]
+fn missions_from_standard_input_are_compared() {
+    let manifest = std::fs::read_to_string(root().join("missions/ugv.toml")).expect("the manifest");
+    let arguments = ["report", "-", "--fail", "c_kinect"];
+    let outcome = metaplan_in(&root(), &arguments, &manifest.replace("../", ""));
+    assert_eq!(outcome.status, 0, "{}", outcome.stderr);
+    assert_eq!(outcome.stdout, page(&["missions/ugv.toml", "--fail", "c_kinect"]));
+}
+
+#[test]
 fn both_plans_are_shown_at_the_time_limit() {
     let directory = tempfile::tempdir().expect("a directory");
     let write = |name: &str, text: &str| {
