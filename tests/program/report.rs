@@ -241,6 +241,25 @@ fn certificates_are_verified_and_shown() {
     }
 }
 
+/// The metric does not matter if there is no plan.
+#[test]
+fn certificates_without_a_plan_are_verified_for_every_objective() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let domain =
+        "(define (domain d) (:requirements :numeric-fluents) (:predicates (at ?p)) (:functions (cost))
+      (:action go :parameters (?p) :precondition (at ?p) :effect (increase (cost) 2)))";
+    let problem =
+        "(define (problem p) (:domain d) (:objects a b) (:init (at a) (= (cost) 0)) (:goal (at b)))";
+    std::fs::write(folder.path().join("d.pddl"), domain).expect("a file");
+    std::fs::write(folder.path().join("p.pddl"), problem).expect("a file");
+    let plan = ["plan", "d.pddl", "p.pddl", "--minimize", "cost", "--certificate", "certificate"];
+    assert_eq!(metaplan_in(folder.path(), &plan, "").status, 10);
+    let report = ["report", "d.pddl", "p.pddl", "--certificate", "certificate"];
+    let outcome = metaplan_in(folder.path(), &report, "");
+    assert_eq!(outcome.status, 10, "{}", outcome.stderr);
+    assert!(outcome.stdout.contains("verified: there is no plan"), "{}", outcome.stderr);
+}
+
 /// If planning takes all the time, the certificate is not checked, so it is not rejected either.
 #[cfg(unix)]
 #[test]

@@ -22,7 +22,11 @@ pub(crate) fn about(
     let (certified, base) = match (certified, mission.knowledge()) {
         (Some(certified), Some(base)) => (certified, base),
         (None, None) => {
-            let (filled, _) = mission.filled().map_err(|messages| first_message(&messages))?;
+            let (mut filled, _) = mission.filled().map_err(|messages| first_message(&messages))?;
+            if matches!(claim, Claim::Unsolvable) {
+                // The metric does not matter if there is no plan.
+                filled.metric = read_pddl(domain, problem)?.1.metric;
+            }
             let equal = print_domain(mission.domain()) == domain && print_problem(&filled) == problem;
             return if equal { Ok(confirmation) } else { mismatch("domain or problem differ") };
         }
