@@ -329,6 +329,24 @@ fn a_context_that_ends_at_the_start_of_an_action_counts() {
     check_small(&format!("{PREFIX}{CONTEXT}"), domain, &[], "2", &["fd_b"]);
 }
 
+/// The parameter for the design of an action must differ from the variables of quantifiers.
+#[test]
+fn quantifiers_do_not_bind_the_parameters_of_designs() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let domain =
+        "(define (domain d) (:requirements :typing :conditional-effects :numeric-fluents) (:types place)
+        (:predicates (done) (seen ?p - place)) (:functions (total-cost) (effort))
+        (:action go :parameters () :precondition () :effect (and (done)
+          (forall (?fd1 - place) (when (seen ?fd1) (increase (total-cost) (effort)))))))";
+    let problem = "(define (problem p) (:domain d) (:objects a b c - place)
+        (:init (= (total-cost) 0) (seen a) (seen b)) (:goal (done)) (:metric minimize (total-cost)))";
+    let knowledge = format!("{PREFIX}{ONE_DESIGN}");
+    let mission = read(directory.path(), &knowledge, domain, problem, &BTreeMap::new());
+    let (_, cost, steps) = answer(&mission.unwrap_or_else(|messages| panic!("{messages:#?}")));
+    // The design `fd_a` has an effort of 1.
+    assert_eq!((cost.as_deref(), steps), (Some("2"), vec![vec![("f".to_owned(), "fd_a".to_owned())]]));
+}
+
 /// A mission with one action, which takes `duration` and has the designs and the bound of `knowledge`.
 fn timed(knowledge: &str, duration: &str, span: &str) -> Mission {
     let directory = tempfile::tempdir().expect("a temporary directory");

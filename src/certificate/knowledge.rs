@@ -26,6 +26,9 @@ pub(super) fn files(
 ) -> Result<Option<[(&'static str, String); 3]>, Message> {
     let Some(knowledge) = mission.knowledge() else { return Ok(None) };
     let sources = knowledge.sources();
+    if !sources.are_repeatable() {
+        return Err(unrepeatable());
+    }
     let first = |messages: Vec<Message>| {
         let unreadable = || Message::error("M120", "no certificate: the knowledge base cannot be read again");
         messages.into_iter().next().unwrap_or_else(unreadable)
@@ -59,6 +62,12 @@ pub(super) fn files(
     let derivations = derivations::write(&engine).map_err(|error| wrong(&error))?;
     let origin = serde_json::to_string(&origin).map_err(|error| wrong(&error))?;
     Ok(Some([(DOCUMENT, document), (ORIGIN, origin), (DERIVATIONS, derivations)]))
+}
+
+/// Returns the error that a knowledge base of a certificate comes from standard input.
+pub fn unrepeatable() -> Message {
+    let text = "no certificate: the knowledge base comes from standard input, which cannot be read again";
+    Message::error("M120", text).with_help("use files for `--kb` and `--rules`")
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ mod proved;
 mod write;
 
 pub use front::write_front;
+pub(crate) use knowledge::unrepeatable;
 pub use proved::{ProvedChecker, Theorem};
 pub use write::{Contents, Ground, write};
 

@@ -4,9 +4,10 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use crate::certificate::unrepeatable;
 use crate::message::Message;
 use crate::mission::numbers::MissingValue;
-use crate::mission::{Mission, btcpp_text, plan_lines, popf_text};
+use crate::mission::{Mission, btcpp_text, first_wait, plan_lines, popf_text};
 use crate::planner::{Planned, PlannedFront, Planner};
 use crate::report::Positions;
 use crate::visible::visible;
@@ -217,6 +218,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let is_drawn = arguments.report.is_some() || arguments.drawing.is_file_wanted();
     let positions = if is_drawn { setup.positions()? } else { Positions::Unknown };
     let mission = setup.mission;
+    let knowledge = mission.knowledge();
+    if arguments.certificate.is_some() && knowledge.is_some_and(|base| !base.sources().are_repeatable()) {
+        return Err(unrepeatable().into());
+    }
     let planner = Planner::new(&mission)?;
     output::warnings(common, mission.warnings().chain(planner.warnings()));
     let limits = guard.plan();
@@ -269,6 +274,17 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         );
         let help = "to exclude expensive plans, add an upper bound on the fluent to the goal";
         output::warnings(common, &[Message::warning("M119", text).with_help(help)]);
+    }
+    if arguments.plan_format == Some(PlanFormat::Btcpp)
+        && let Some(step) = planned.written().as_ref().and_then(first_wait)
+    {
+        let text = format!(
+            "`--plan-format btcpp` writes actions without their times, and the plan waits until {} for `{}`",
+            step.start,
+            step.call()
+        );
+        let help = "use `--plan-format ipc` or `json`, which include the times";
+        return Err(Failure::usage(Message::error("M107", text).with_help(help)));
     }
     finish(&planned, &mission, (arguments, common))?;
     // The plan is shown before the certificate is written, which may take long.

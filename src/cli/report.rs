@@ -51,7 +51,14 @@ pub struct Arguments {
     #[command(flatten)]
     overlap: Overlap,
     /// Report a run of the loop from its journal instead of a plan: events, inferences, plans and effects.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["inputs", "certificate", "scenario", "set", "fail", "concurrent"])]
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = [
+            "inputs", "certificate", "scenario", "set", "fail", "concurrent", "knowledge", "rules", "names", "catalog",
+            "directory", "ignore_missing_imports",
+        ]
+    )]
     journal: Option<PathBuf>,
     /// Also write each picture as an SVG file to a directory; created if it does not exist.
     #[arg(long, value_name = "DIR")]
@@ -74,9 +81,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             .map_err(Failure::from)
             .and_then(|report| journal(arguments, directory, &report));
     }
-    let setup = arguments.situation.setup(&arguments.inputs, common)?;
-    let before = arguments.situation.before();
-    let before = before.map(|situation| situation.setup(&arguments.inputs, common)).transpose()?;
+    let (setup, before) = arguments.situation.setups(&arguments.inputs, common)?;
     let positions = setup.positions()?;
     output::warnings(common, setup.mission.warnings());
     let limits = guard.plan();

@@ -123,19 +123,37 @@ impl Situation {
         during("reading", common, || self.read(inputs))
     }
 
+    /// Returns the mission and, if these options change the initial situation, also the mission without these changes.
+    pub(super) fn setups(
+        &self,
+        inputs: &[PathBuf],
+        common: &Common,
+    ) -> Result<(Setup, Option<Setup>), Failure> {
+        during("reading", common, || {
+            // Standard input cannot be read twice.
+            let mut setup = self.unchanged(inputs)?;
+            let before = self.before().map(|options| (options, setup.clone()));
+            self.change(&mut setup)?;
+            let before = before.map(|(options, mut setup)| options.change(&mut setup).map(|()| setup));
+            Ok((setup, before.transpose()?))
+        })
+    }
+
     fn read(&self, inputs: &[PathBuf]) -> Result<Setup, Failure> {
-        let mut setup = match inputs {
+        let mut setup = self.unchanged(inputs)?;
+        self.change(&mut setup)?;
+        Ok(setup)
+    }
+
+    fn unchanged(&self, inputs: &[PathBuf]) -> Result<Setup, Failure> {
+        Ok(match inputs {
             [manifest] => {
                 if self.adds_knowledge() {
                     let text = "`--kb`, `--rules`, `--name` and the options for imports require DOMAIN and \
                                 PROBLEM; the manifest of a mission has keys for them";
                     return Err(Failure::usage(Message::error("M107", text)));
                 }
-                let mut setup = Setup::read(manifest)?;
-                if let Some(name) = &self.scenario {
-                    setup.apply(name).map_err(scenario_failure)?;
-                }
-                setup
+                Setup::read(manifest)?
             }
             [domain, problem] => {
                 if self.scenario.is_some() {
@@ -170,7 +188,14 @@ impl Situation {
                 let text = "give a mission's manifest, or a domain and a problem";
                 return Err(Failure::usage(Message::error("M107", text)));
             }
-        };
+        })
+    }
+
+    /// Applies the scenario, the failures and the settings.
+    fn change(&self, setup: &mut Setup) -> Result<(), Failure> {
+        if let Some(name) = &self.scenario {
+            setup.apply(name).map_err(scenario_failure)?;
+        }
         let mission = &mut setup.mission;
         for component in &self.fail {
             mission.fail(component).map_err(Failure::usage)?;
@@ -180,7 +205,7 @@ impl Situation {
         }
         consistent(mission.knowledge())?;
         numbers::note_doubts(mission);
-        Ok(setup)
+        Ok(())
     }
 }
 

@@ -33,7 +33,8 @@ pub struct Wishes {
     /// Definition of a design's utility.
     pub worth: Worth,
     /// Budgets: attribute types by local name, each with a limit in its unit. The limit applies to the sum of the
-    /// estimations of all designs in use. A design without an estimation counts as 0.
+    /// estimations of all designs in use. A design counts once even if it serves several objectives, and as 0 without an
+    /// estimation.
     pub budgets: Vec<(String, BigRational)>,
     /// Components, by local name, that only one design can use at a time.
     pub exclusive: BTreeSet<String>,
@@ -124,6 +125,19 @@ struct Offer {
     unestimated: BTreeSet<String>,
 }
 
+impl Offer {
+    fn has_design_of(&self, other: &Self) -> bool {
+        self.choice.identity.is_some() && self.choice.identity == other.choice.identity
+    }
+}
+
+/// Returns one offer of each design, except designs in `kept`. A design that serves several objectives uses its
+/// components and its share of the budgets once.
+fn distinct<'o>(offers: impl Iterator<Item = &'o Offer>, kept: &[&Offer]) -> Vec<&'o Offer> {
+    let mut designs: BTreeSet<usize> = kept.iter().filter_map(|offer| offer.choice.identity).collect();
+    offers.filter(|offer| offer.choice.identity.is_none_or(|design| designs.insert(design))).collect()
+}
+
 impl Group {
     /// Returns the usable designs without an estimation that another design of the function has, as sentences.
     fn unestimated(&self) -> impl Iterator<Item = String> {
@@ -180,7 +194,7 @@ pub(super) fn choose(
             fixed.push(group);
         }
     }
-    let fixed_offers: Vec<&Offer> = fixed.iter().filter_map(|group| group.candidates.first()).collect();
+    let fixed_offers = distinct(fixed.iter().filter_map(|group| group.candidates.first()), &[]);
     let remaining: Vec<BigRational> = wishes
         .budgets
         .iter()
@@ -193,13 +207,23 @@ pub(super) fn choose(
         .collect();
     let used_components: BTreeSet<usize> =
         fixed_offers.iter().flat_map(|offer| offer.choice.components.clone()).collect();
-    let usable =
-        |offer: &Offer| offer.rejections.is_empty() && offer.choice.components.is_disjoint(&used_components);
+    let is_kept = |offer: &Offer| fixed_offers.iter().any(|kept| kept.has_design_of(offer));
+    let usable = |offer: &Offer| {
+        offer.rejections.is_empty()
+            && (is_kept(offer) || offer.choice.components.is_disjoint(&used_components))
+    };
+    let choice = |offer: &Offer| {
+        let mut choice = offer.choice.clone();
+        if is_kept(offer) {
+            (choice.demands, choice.components) = (Vec::new(), BTreeSet::new());
+        }
+        choice
+    };
     let mut positions: Vec<Vec<usize>> = Vec::with_capacity(needing.len());
     let mut functions: Vec<Vec<DesignChoice>> = Vec::with_capacity(needing.len());
     for group in &needing {
         let usable = group.candidates.iter().enumerate().filter(|(_, offer)| usable(offer));
-        let (at, choices) = usable.map(|(at, offer)| (at, offer.choice.clone())).unzip();
+        let (at, choices) = usable.map(|(at, offer)| (at, choice(offer))).unzip();
         positions.push(at);
         functions.push(choices);
     }
@@ -249,14 +273,15 @@ fn violated(wishes: &Wishes, kept: &[&Offer]) -> Vec<String> {
 struct Offers<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
-    designs: BTreeMap<String, (Vec<String>, BTreeMap<String, BigRational>)>,
+    /// Number, components and estimations of each design, by IRI.
+    designs: BTreeMap<String, (Option<usize>, Vec<String>, BTreeMap<String, BigRational>)>,
 }
 
 impl<'a> Offers<'a> {
     fn new(knowledge: &'a Knowledge, wishes: &'a Wishes) -> Self {
-        let designs = knowledge.view().function_designs().into_iter().map(|design| {
+        let designs = knowledge.view().function_designs().into_iter().enumerate().map(|(number, design)| {
             let components = design.components.into_iter().map(|component| component.name).collect();
-            (design.individual.iri, (components, design.estimations))
+            (design.individual.iri, (Some(number), components, design.estimations))
         });
         Self { knowledge, wishes, designs: designs.collect() }
     }
@@ -270,9 +295,10 @@ impl<'a> Offers<'a> {
             self.knowledge.runtime().candidates(&objective.individual.iri, attribute);
         let candidates_of_objective =
             candidates_of_objective.map_err(|error| Message::from_ontology(&error))?;
-        let nothing = (Vec::new(), BTreeMap::new());
+        let nothing = (None, Vec::new(), BTreeMap::new());
         let offer = |candidate: ontology::runtime::Candidate| {
-            let (components, estimations) = self.designs.get(&candidate.design.iri).unwrap_or(&nothing);
+            let (identity, components, estimations) =
+                self.designs.get(&candidate.design.iri).unwrap_or(&nothing);
             // The optimizer maximises, so the sign of a minimised attribute is changed.
             let worth = candidate.utility;
             let utility = if matches!(self.wishes.worth, Worth::Least(_)) { -worth } else { worth };
@@ -285,6 +311,7 @@ impl<'a> Offers<'a> {
                 utility: utility.clone(),
                 demands: self.wishes.budgets.iter().map(demand).collect(),
                 components: used.map(|(number, _)| number).collect(),
+                identity: *identity,
             };
             let (design, components) = (candidate.design.name, components.clone());
             let missed = candidate.missed.iter().map(requirement_text).collect();
@@ -383,7 +410,10 @@ impl Whole<'_> {
             self.needing.iter().zip(self.designs).enumerate().filter(|(other, _)| *other != at);
         let chosen = chosen_elsewhere
             .filter_map(|(_, (group, design))| design.map(|design| &group.candidates[design]));
-        let chosen_elsewhere: Vec<&Offer> = chosen.chain(unserved.iter().copied()).collect();
+        let chosen_elsewhere = distinct(chosen.chain(unserved.iter().copied()), self.kept);
+        if self.kept.iter().chain(&chosen_elsewhere).any(|other| other.has_design_of(offer)) {
+            return None;
+        }
         for other in self.kept.iter().chain(&chosen_elsewhere) {
             if let Some(component) = self
                 .wishes

@@ -146,6 +146,16 @@ fn nearest(sets: &[Vec<Alteration>]) -> Vec<Vec<Alteration>> {
     sets.iter().filter(is_nearest).cloned().collect()
 }
 
+/// Returns the reason why a design is available or not if the knowledge base alone has another conclusion than the
+/// axioms of the domain. `None` if they agree.
+pub fn disagreement(design: &FunctionDesign, available: bool) -> Option<&'static str> {
+    (available != design.available).then_some(if available {
+        "the knowledge base rules it out, but in the initial state the axioms of the domain do not"
+    } else {
+        "in the initial state the axioms of the domain rule it out, but the knowledge base alone does not"
+    })
+}
+
 pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
     let available = mission.is_available(&mission.current(), design);
     let mut availability = Availability {
@@ -159,12 +169,7 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         unexamined: Vec::new(),
     };
     let Some(knowledge) = mission.knowledge() else { return availability };
-    if available != design.available {
-        let text = if available {
-            "the knowledge base rules it out, but in the initial state the axioms of the domain do not"
-        } else {
-            "in the initial state the axioms of the domain rule it out, but the knowledge base alone does not"
-        };
+    if let Some(text) = disagreement(design, available) {
         availability.because.push(text.to_owned());
         availability.unexamined.push(INITIAL_STATE.to_owned());
         return availability;

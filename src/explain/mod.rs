@@ -30,6 +30,7 @@ use crate::mission::Mission;
 
 use solve::solve;
 
+pub(crate) use causes::disagreement;
 pub use causes::{Availability, Cause, Causes, causes};
 pub use parts::{Alteration, BestPlan, Change, Repair, Target};
 pub use solve::best;

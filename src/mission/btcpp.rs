@@ -10,6 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use ::mission::Mission;
+use num_rational::BigRational;
 use planner::{Plan, Step};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
@@ -24,13 +25,24 @@ struct Node {
     ports: Vec<(String, String)>,
 }
 
-/// Returns the XML of a behaviour tree for a sequential plan. The plan's arguments must be those of the domain's file,
-/// without the designs that the knowledge base has added.
+/// Returns the XML of a behaviour tree for a sequential plan without waits, see [`first_wait`]. The plan's arguments must
+/// be those of the domain's file, without the designs that the knowledge base has added.
 pub fn btcpp_text(mission: &Mission, plan: &Plan) -> String {
     let mut text = Vec::new();
     // Writing to memory does not fail.
     let _ = write(&mut Writer::new_with_indent(&mut text, b' ', 2), &mission.name, &nodes(mission, plan));
     String::from_utf8(text).unwrap_or_default() + "\n"
+}
+
+/// Returns the first action of a sequential plan before which the robot waits for a timed initial literal.
+pub fn first_wait(plan: &Plan) -> Option<&Step> {
+    let mut end = BigRational::default();
+    plan.steps.iter().find(|step| {
+        let start = step.start.to_rational();
+        let is_late = start > end;
+        end = start + step.duration.to_rational();
+        is_late
+    })
 }
 
 fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {

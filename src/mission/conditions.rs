@@ -62,7 +62,7 @@ pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
 /// Checks a setting that [`Mission::set`] has accepted. Returns a message if the objects in its name or value do not
 /// exist or have wrong types.
 pub(super) fn setting(mission: &Mission, name: &str, value: &str) -> Option<Message> {
-    if mission.knowledge().is_some_and(|knowledge| knowledge.has_attribute(name.trim())) {
+    if mission.knowledge().is_some_and(|knowledge| knowledge.uses_measurement(name.trim())) {
         return None;
     }
     let is_truth = ["true", "false"].iter().any(|truth| value.trim().eq_ignore_ascii_case(truth));

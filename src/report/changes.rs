@@ -111,8 +111,11 @@ fn shown(atom: &Atom) -> String {
 
 fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
     let available = |mission: &Mission| -> BTreeMap<String, bool> {
-        let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
-        designs.map(|design| (design.individual.name.clone(), design.available)).collect()
+        let (knowledge, problem) = (mission.knowledge(), mission.current());
+        let designs = knowledge.into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
+        designs
+            .map(|design| (design.individual.name.clone(), mission.is_available(&problem, design)))
+            .collect()
     };
     let (old, new) = (available(before), available(after));
     let changed = new.iter().filter(|(design, now)| old.get(*design) != Some(now));

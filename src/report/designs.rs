@@ -7,7 +7,7 @@ use ontology::tomasys::{Component, FunctionDesign, Measurement, Requirement};
 use picture::{Design, Reason, Step};
 use rules::{Derivation, Reason as Why, Symbols};
 
-use crate::explain::{Causes, causes};
+use crate::explain::{Causes, causes, disagreement};
 use crate::knowledge::Knowledge;
 use crate::mapek::{fact_text, unavailable};
 use crate::mission::Mission;
@@ -21,13 +21,17 @@ const DEPTH: usize = 100;
 pub fn designs(mission: &Mission, steps: &[Step]) -> Vec<Design> {
     let Some(knowledge) = mission.knowledge() else { return Vec::new() };
     let (components, measurements) = (knowledge.view().components(), knowledge.view().measurements());
-    let each = knowledge.catalogue().designs().iter();
-    each.map(|design| design_picture(knowledge, design, (&components, &measurements), steps)).collect()
+    let problem = mission.current();
+    let picture = |design: &FunctionDesign| {
+        let available = mission.is_available(&problem, design);
+        design_picture(knowledge, (design, available), (&components, &measurements), steps)
+    };
+    knowledge.catalogue().designs().iter().map(picture).collect()
 }
 
 fn design_picture(
     knowledge: &Knowledge,
-    design: &FunctionDesign,
+    (design, available): (&FunctionDesign, bool),
     (components, measurements): (&[Component], &[Measurement]),
     steps: &[Step],
 ) -> Design {
@@ -43,7 +47,7 @@ fn design_picture(
     let requirements = design.requirements.iter().map(|requirement| required(requirement, measurements));
     Design {
         functions: design.solves.iter().map(|function| function.name.clone()).collect(),
-        available: design.available,
+        available,
         estimations: design
             .estimations
             .iter()
@@ -51,7 +55,7 @@ fn design_picture(
             .collect(),
         needs: components.chain(requirements).collect(),
         steps: (1..).zip(steps).filter(|(_, step)| uses(step)).map(|(number, _)| number).collect(),
-        because: because(knowledge, &name, design.available),
+        because: because(knowledge, &name, available),
         name,
     }
 }
@@ -74,6 +78,10 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
 /// Returns the reasons why a design is available or not. For an unavailable design, these are
 /// derivations from the causes, or the fault that stopped the reasoning.
 pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
+    let design = knowledge.catalogue().designs().iter().find(|candidate| candidate.individual.name == design);
+    if let Some(text) = design.and_then(|design| disagreement(design, available)) {
+        return vec![Reason { text: text.to_owned(), supports: Vec::new() }];
+    }
     if available {
         let text = "no fact states or implies that the design is not realisable or not available".to_owned();
         return vec![Reason { text, supports: Vec::new() }];
@@ -82,7 +90,6 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
         let text = format!("the conclusions are unknown: {}", fault.message);
         return vec![Reason { text, supports: Vec::new() }];
     }
-    let design = knowledge.catalogue().designs().iter().find(|candidate| candidate.individual.name == design);
     let Some(design) = design else { return Vec::new() };
     let Causes { causes, suffice_together } = causes(knowledge, design);
     let count = causes.len();

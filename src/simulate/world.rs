@@ -327,7 +327,12 @@ impl World {
             }
             for (name, value) in set {
                 self.truth.set(&name, &value)?;
-                events.push(Event::Fact { name, value });
+                let knowledge = self.truth.knowledge();
+                let is_measured = knowledge.is_some_and(|knowledge| knowledge.uses_measurement(name.trim()));
+                events.push(match number::exact(&value).filter(|_| is_measured) {
+                    Some(value) => Event::Measured { attribute: name.trim().to_owned(), value },
+                    None => Event::Fact { name, value },
+                });
             }
         }
         while self.component_changes.first().is_some_and(|change| change.time <= self.time) {

@@ -142,8 +142,9 @@ pub struct Study {
     /// Directory of the study's file, which is the working directory of the runs.
     pub directory: PathBuf,
     /// Checksum of the study's command, generator, time limit and values, of the files whose paths are words of the
-    /// command, of all files of missions among them, and of the program's version. It does not cover the imports of a
-    /// knowledge base that the command names itself, the files of the generator, and files in `{dir}`.
+    /// command or values of its options, of all files of missions among them, and of the program's version. It does not
+    /// cover the imports of a knowledge base that the command names itself, the files of the generator, and files in
+    /// `{dir}`.
     pub digest: String,
     /// Varied keys with their values. The value of the last key changes from each run to the next.
     keys: Vec<(String, Vec<Value>)>,
@@ -497,6 +498,13 @@ fn instances(word: &str, keys: &[(String, Vec<Value>)]) -> impl Iterator<Item = 
     })
 }
 
+fn several(value: &Value) -> &[Value] {
+    match value {
+        Value::Array(values) => values,
+        one => std::slice::from_ref(one),
+    }
+}
+
 fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) -> String {
     let mut hash = Sha256::new();
     let mut part = |bytes: &[u8]| {
@@ -508,9 +516,15 @@ fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) 
     part(env!("CARGO_PKG_VERSION").as_bytes());
     part(format!("{:?} {:?} {:?}", sections.command, sections.time_limit, sections.generate).as_bytes());
     part(json!(keys).to_string().as_bytes());
-    // An option is not the path of a file.
-    let words = sections.command.iter().filter(|word| !word.starts_with('-'));
-    for word in words.flat_map(|word| instances(word, keys)) {
+    // An option is not the path of a file, but its value may be one.
+    let words = sections.command.iter().filter_map(|word| match word.split_once('=') {
+        Some((option, value)) if option.starts_with('-') => Some(value),
+        _ => Some(word.as_str()).filter(|word| !word.starts_with('-')),
+    });
+    let named = sections.placeholders();
+    let options = keys.iter().filter(|(key, _)| !named.contains(key.as_str())).flat_map(|(_, values)| values);
+    let options = options.flat_map(several).filter_map(Value::as_str).map(str::to_owned);
+    for word in words.flat_map(|word| instances(word, keys)).chain(options) {
         let path = directory.join(word);
         let Ok(bytes) = std::fs::read(&path) else { continue };
         part(&bytes);
@@ -554,6 +568,22 @@ mod tests {
         // No run uses this file.
         write("m-2.toml", "a");
         assert_eq!(with, digest());
+    }
+
+    #[test]
+    fn files_of_options_belong_to_the_digest() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let write = |name: &str, text: &str| {
+            std::fs::write(folder.path().join(name), text).expect("it can be written");
+        };
+        let command = "command = ['plan', 'd.pddl', 'p.pddl', '--rules=r-{n}.txt']";
+        write("study.toml", &format!("{command}\n[vary]\nkb = ['a.ttl', ['b.ttl', 'c.ttl']]\nn = [1]\n"));
+        let digest = || Study::read(&folder.path().join("study.toml")).expect("a study").digest;
+        for name in ["r-1.txt", "a.ttl", "b.ttl", "c.ttl"] {
+            let before = digest();
+            write(name, "x");
+            assert_ne!(before, digest(), "{name}");
+        }
     }
 
     #[test]

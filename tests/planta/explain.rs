@@ -101,6 +101,15 @@ fn designs_that_the_problem_makes_unrealisable_are_reasons() {
     }
 }
 
+#[test]
+fn spellings_of_a_boolean_are_one_value() {
+    let unrealisable = "ClassAssertion(t:FunctionDesign :e) ObjectPropertyAssertion(t:solvesF :e :f)
+      DataPropertyAssertion(t:fd_realisability :e \"0\"^^xsd:boolean)";
+    let (_directory, input) = mission(unrealisable, USE, "(Broken d)");
+    let answer = answer(&input, "plan", &[], 10);
+    assert_eq!(answer["blocking"], json!(["d", "e"]), "{answer:#}");
+}
+
 /// The design `r` is ready, but `d` has to be prepared.
 #[test]
 fn rivals_keep_their_other_functions() {
@@ -140,4 +149,16 @@ fn measurements_of_the_problem_rule_designs_out() {
     };
     assert_eq!(arguments(&planned), arguments(&explained["best"]), "{explained:#}");
     assert!(explained["alone"].to_string().contains("fd_spiral_high"), "{explained:#}");
+}
+
+#[test]
+fn reports_state_the_availability_that_follows_from_the_axioms() {
+    let (directory, input) = mission("", &format!("{USE}{REPAIR}"), "");
+    let page = directory.path().join("report.html").display().to_string();
+    let outcome = metaplan(&input.arguments("report", &["--set", "Broken d=true", "--output", &page]));
+    assert_eq!(outcome.0, 0, "{outcome:?}");
+    let text = std::fs::read_to_string(&page).expect("a page");
+    assert!(text.contains("d is not available any more"), "{text}");
+    // In the list of changes, and in the list of designs.
+    assert_eq!(text.matches("the axioms of the domain rule it out").count(), 2, "{text}");
 }

@@ -122,6 +122,16 @@ fn timed_initial_literals_are_waited_for() {
     let timed = PROBLEM.replace("(way b c)", "(at 5 (way b c))");
     let outcome = plan(DOMAIN, &timed, &["--plan-format", "ipc"]);
     assert_eq!(outcome.stdout, "0.000: (go a b)  [0.000]\n5.001: (go b c)  [0.000]\n");
+    // A behaviour tree of actions has no waits.
+    let tree = ["--plan-format", "btcpp"];
+    let refused = plan(DOMAIN, &timed, &tree);
+    check(&refused, 2, &["M107", "the plan waits until 5.001 for `(go b c)`"]);
+    assert_eq!(refused.stdout, "");
+    check(
+        &plan(DOMAIN, &PROBLEM.replace("(way b c)", "(way b c) (at 5 (not (way b c)))"), &tree),
+        0,
+        &["go"],
+    );
 }
 
 #[test]
@@ -297,6 +307,14 @@ fn reads_standard_input() {
     let kb = std::fs::read_to_string(root().join("ontology/kb/ugv.ttl")).expect("the knowledge base");
     let outcome = metaplan_in(&root(), &["reason", "-", "--rules", "coadaptation", "--fail", "c_lidar"], &kb);
     check(&outcome, 0, &["fd_mrpt_lidar", "not available"]);
+    // A certificate contains the knowledge base, which is read again for it.
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let certificate = directory.path().join("certificate").display().to_string();
+    let files = ["encodings/ugv/domain.pddl", "encodings/ugv/problem.pddl", "--kb"];
+    let arguments = [&["plan"][..], &files, &["-", "--certificate", &certificate]].concat();
+    let outcome = metaplan_in(&root(), &arguments, &kb);
+    check(&outcome, 3, &["M120", "standard input"]);
+    assert_eq!(outcome.stdout, "");
 }
 
 #[test]

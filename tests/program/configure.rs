@@ -173,6 +173,20 @@ fn objectives_that_need_no_design_keep_theirs() {
 }
 
 #[test]
+fn a_design_of_two_objectives_uses_its_components_and_budgets_once() {
+    let shared = ":e a t:QualityAttributeType . :c a t:Component . :f0 a t:Function .
+        :fd a t:FunctionDesign ; t:solvesF :f0 ; t:requiresC :c ;
+        t:hasQAestimation [ a t:QAvalue ; t:isQAtype :e ; t:hasValue 3 ] .
+        :o0 a t:Objective ; t:typeF :f0 . :o1 a t:Objective ; t:typeF :f0 .\n";
+    let (both, none) = ([("o0", Some("fd")), ("o1", Some("fd"))], [("o0", None), ("o1", None)]);
+    check(shared, &["--exclusive", "c", "--budget", "e=5"], 0, &both, &[]);
+    check(shared, &["--exclusive", "c", "--budget", "e=2"], 10, &none, &[]);
+    // The first objective keeps the design.
+    let kept = format!("{shared}:g0 a t:FunctionGrounding ; t:typeFD :fd ; t:solvesO :o0 .");
+    check(&kept, &["--exclusive", "c", "--budget", "e=5"], 0, &both[1..], &[]);
+}
+
+#[test]
 fn designs_without_an_estimation_are_reported() {
     let designs = ":u a t:QualityAttributeType . :e a t:QualityAttributeType . :f0 a t:Function .
         :fd_known a t:FunctionDesign ; t:solvesF :f0 ; t:hasQAestimation [ a t:QAvalue ; t:isQAtype :u ; t:hasValue 1.0 ] ,

@@ -83,6 +83,15 @@ fn plans_before_and_after_are_compared_with_reasons() {
 
 /// The plan of the current situation must not use up the time for the plan before.
 #[test]
+fn missions_from_standard_input_are_compared() {
+    let manifest = std::fs::read_to_string(root().join("missions/ugv.toml")).expect("the manifest");
+    let arguments = ["report", "-", "--fail", "c_kinect"];
+    let outcome = metaplan_in(&root(), &arguments, &manifest.replace("../", ""));
+    assert_eq!(outcome.status, 0, "{}", outcome.stderr);
+    assert_eq!(outcome.stdout, page(&["missions/ugv.toml", "--fail", "c_kinect"]));
+}
+
+#[test]
 fn both_plans_are_shown_at_the_time_limit() {
     let directory = tempfile::tempdir().expect("a directory");
     let write = |name: &str, text: &str| {
@@ -230,6 +239,25 @@ fn certificates_are_verified_and_shown() {
         let verdict = format!("{directory}: NOT verified");
         assert!(outcome.stderr.contains(&verdict), "{}", outcome.stderr);
     }
+}
+
+/// The metric does not matter if there is no plan.
+#[test]
+fn certificates_without_a_plan_are_verified_for_every_objective() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let domain =
+        "(define (domain d) (:requirements :numeric-fluents) (:predicates (at ?p)) (:functions (cost))
+      (:action go :parameters (?p) :precondition (at ?p) :effect (increase (cost) 2)))";
+    let problem =
+        "(define (problem p) (:domain d) (:objects a b) (:init (at a) (= (cost) 0)) (:goal (at b)))";
+    std::fs::write(folder.path().join("d.pddl"), domain).expect("a file");
+    std::fs::write(folder.path().join("p.pddl"), problem).expect("a file");
+    let plan = ["plan", "d.pddl", "p.pddl", "--minimize", "cost", "--certificate", "certificate"];
+    assert_eq!(metaplan_in(folder.path(), &plan, "").status, 10);
+    let report = ["report", "d.pddl", "p.pddl", "--certificate", "certificate"];
+    let outcome = metaplan_in(folder.path(), &report, "");
+    assert_eq!(outcome.status, 10, "{}", outcome.stderr);
+    assert!(outcome.stdout.contains("verified: there is no plan"), "{}", outcome.stderr);
 }
 
 /// If planning takes all the time, the certificate is not checked, so it is not rejected either.

@@ -377,6 +377,13 @@ fn events_and_losses_do_not_need_a_working_action() {
     assert_eq!(lost["lost"], true, "{lost:#}");
 }
 
+/// The loop must receive the same change of a measured attribute as the simulated world.
+#[test]
+fn events_that_set_an_attribute_are_measurements() {
+    let dazzled = simulate_stalled("[[event]]\nat = 0.5\nset = {ambient_light = '0.9'}\n");
+    assert_eq!((&dazzled["accomplished"], &dazzled["failed"]), (&true.into(), &0.into()), "{dazzled:#}");
+}
+
 #[test]
 fn failed_missions_are_reported_with_the_reason() {
     let arguments =

@@ -2,7 +2,7 @@
 //! that it needs. Brute force shows that the optimal plans with a full and with a low battery are
 //! unique.
 
-use crate::common::{metaplan, metaplan_in, root, steps};
+use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root, steps};
 
 fn check(arguments: &[&str], expected: &[&str], cost: i64) {
     let command: Vec<&str> =
@@ -43,6 +43,28 @@ fn visibility_limits_the_search_height() {
     check(&["--set", "water_visibility=2.5"], &medium, 34);
     let outcome = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1"]);
     assert_eq!(outcome.status, 10, "{outcome:#?}");
+}
+
+/// The function `battery` keeps its meaning if the knowledge base has an attribute of its name.
+#[test]
+fn settings_change_functions_that_are_named_like_an_attribute() {
+    let measured = ":obs_battery a t:QAvalue ; t:isQAtype :battery ; t:isMeasured true ; t:hasValue 100.0 .";
+    let estimated =
+        ":fd_speed_low t:hasQAestimation [ a t:QAvalue ; t:isQAtype :battery ; t:hasValue 4.0 ] .";
+    for statement in [measured, estimated] {
+        let mission = copy_of_mission("uuv");
+        let component = ":c_thruster_1 a owl:NamedIndividual , t:Component .";
+        let statements = format!("{component} :battery a t:QualityAttributeType . {statement}");
+        edit(mission.path(), "ontology/kb/uuv.ttl", component, &statements);
+        for arguments in [
+            &["plan", "missions/uuv.toml", "--scenario", "battery_drop"][..],
+            &["explain", "missions/uuv.toml"],
+        ] {
+            let (outcome, expected) = (metaplan_in(mission.path(), arguments, ""), metaplan(arguments));
+            assert_eq!(outcome.stdout, expected.stdout, "{statement}: {outcome:#?}");
+            assert_eq!((outcome.status, expected.status), (0, 0), "{statement}: {outcome:#?}");
+        }
+    }
 }
 
 /// Designs for motion: time and battery usage, each per unit of work.

@@ -2,6 +2,7 @@
 //! facts of the problem.
 
 use num_rational::BigRational;
+use ontology::vocab::local_name;
 use pddl::ast::{Atom, Declaration, InitialElement, Name, Span, Term};
 
 use crate::binding::identifier;
@@ -10,7 +11,8 @@ use crate::message::{Message, did_you_mean};
 
 impl Mission {
     /// Sets a value. The first matching case applies:
-    /// - a measured attribute of the knowledge base (`ambient_light=0.9`);
+    /// - an attribute of the knowledge base whose measured values have an effect (`ambient_light=0.9`); the value also
+    ///   replaces those that the problem states for functions bound to the attribute;
     /// - a numeric function of the problem with its arguments (`battery=30`, `travel_time wp1
     ///   wp2=3`);
     /// - a predicate with all its arguments, set to true or false (`pipeline_found pl1=true`);
@@ -23,14 +25,23 @@ impl Mission {
     /// setting would remove.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), Message> {
         self.forget();
-        let value = value.trim();
+        let (name, value) = (name.trim(), value.trim());
         if let Some(knowledge) = &mut self.knowledge
-            && knowledge.has_attribute(name.trim())
+            && knowledge.uses_measurement(name)
         {
-            if !knowledge.uses_measurement(name.trim()) {
-                return Err(Message::error("M106", unused_measurement(name.trim())));
+            knowledge.measure(name, value)?;
+            // A value that the problem states would take precedence over the measurement.
+            for function in self.fed_by(local_name(name)) {
+                if self.value(&function).is_some() {
+                    self.set_in_problem(&function, value)?;
+                }
             }
-            return knowledge.measure(name.trim(), value).map(|_| ());
+            return Ok(());
+        }
+        let is_attribute = self.knowledge.as_ref().is_some_and(|knowledge| knowledge.has_attribute(name));
+        // The designs of an action determine the value of such a function.
+        if is_attribute && self.stands_for_designs(&Name::new(name)) {
+            return Err(Message::error("M106", unused_measurement(name)));
         }
         self.set_in_problem(name, value).map(|_| ())
     }

@@ -4,22 +4,23 @@
 //! the greatest sum of utilities. Ties are broken in favour of earlier designs of earlier functions. The three
 //! criteria are combined into one integer, the *worth* of an assignment: an additional served function outweighs
 //! all requirements, and one requirement outweighs all utilities. A component that only one design can use is
-//! modelled as a budget of 1.
+//! modelled as a budget of 1. A design that several functions select consumes budgets once.
 //!
 //! The algorithm is dynamic programming over the functions with dominance pruning. A partial assignment is dominated
 //! if another one for these functions consumes no more of any budget and has a greater worth. At equal worth, the
-//! other one must also be preferred. A partial assignment is also pruned if a budget does not even suffice for the
-//! minimum consumption of the remaining functions. So is one with an upper bound on its completions that is less than
-//! the best known worth. This upper bound is a Lagrangian relaxation of the budgets, which is valid for any
-//! non-negative multipliers \[1\]. A subgradient method computes good multipliers in floating-point arithmetic
-//! \[2\]. The multipliers are then rounded, and the bound is evaluated exactly.
+//! other one must also be preferred. Both must have selected the same designs that later functions can select, too. A
+//! partial assignment is also pruned if a budget does not even suffice for the minimum consumption of the remaining
+//! functions. So is one with an upper bound on its completions that is less than the best known worth. This upper bound
+//! is a Lagrangian relaxation of the budgets, which is valid for any non-negative multipliers \[1\]. A subgradient
+//! method computes good multipliers in floating-point arithmetic \[2\]. The multipliers are then rounded, and the bound
+//! is evaluated exactly.
 //!
 //! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of
 //!   Resources, Operations Research 11(3), 1963.
 //! - \[2\] M. Held, R. M. Karp: The Traveling-Salesman Problem and Minimum Spanning Trees: Part II,
 //!   Mathematical Programming 1, 1971.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use num_bigint::BigInt;
 use num_integer::Integer as _;
@@ -45,6 +46,9 @@ pub struct DesignChoice {
     /// Exclusive components that the design uses, numbered by the caller. At most one selected design may use
     /// each component.
     pub components: BTreeSet<usize>,
+    /// Number of the design, if several functions can select it. Choices with one number have equal demands and
+    /// components. If several of them are selected, they count as one design.
+    pub identity: Option<usize>,
 }
 
 /// An assignment of designs to functions.
@@ -60,8 +64,8 @@ pub struct Assignment {
 }
 
 /// Computes the best assignment of designs to functions that respects the budgets and uses each exclusive component
-/// at most once. The best assignment serves the most functions, then violates the fewest requirements, then has the
-/// greatest utility; among equals, earlier designs are preferred. At a limit, returns the best known assignment. If
+/// by at most one design. The best assignment serves the most functions, then violates the fewest requirements, then has
+/// the greatest utility; among equals, earlier designs are preferred. At a limit, returns the best known assignment. If
 /// no assignment that respects the budgets is found, no design is selected.
 pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Assignment {
     let problem = Problem::new(functions, budgets);
@@ -81,6 +85,8 @@ pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limit
 struct Item {
     worth: BigInt,
     demands: Vec<BigInt>,
+    /// Identity of the design, if several functions can select it.
+    shared: Option<usize>,
 }
 
 struct Problem {
@@ -89,6 +95,8 @@ struct Problem {
     /// For each function: the minimum consumption of each budget by this and all later functions;
     /// at the end 0.
     least: Vec<Vec<BigInt>>,
+    /// The first and the last function of each design that several functions can select, by identity.
+    shared: BTreeMap<usize, (usize, usize)>,
 }
 
 /// The selected designs of the functions up to some index.
@@ -97,6 +105,8 @@ struct Label {
     designs: Vec<Option<usize>>,
     worth: BigInt,
     spent: Vec<BigInt>,
+    /// Identities of the selected designs that further functions can select.
+    shared: BTreeSet<usize>,
 }
 
 impl Label {
@@ -105,13 +115,15 @@ impl Label {
         label.designs.push(position);
         if let Some(item) = item {
             label.worth += &item.worth;
-            label.spent.iter_mut().zip(&item.demands).for_each(|(spent, demand)| *spent += demand);
+            if item.shared.is_none_or(|design| label.shared.insert(design)) {
+                label.spent.iter_mut().zip(&item.demands).for_each(|(spent, demand)| *spent += demand);
+            }
         }
         label
     }
 
     fn is_as_free(&self, other: &Self) -> bool {
-        self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
+        self.shared == other.shared && self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
     }
 }
 
@@ -160,12 +172,20 @@ impl Problem {
             columns.push(uses.collect::<Vec<_>>().into_iter());
             whole.push(BigInt::one());
         }
-        let mut item = || Item {
+        let mut shared: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
+        for (at, designs) in functions.iter().enumerate() {
+            for design in designs.iter().filter_map(|design| design.identity) {
+                shared.entry(design).or_insert((at, at)).1 = at;
+            }
+        }
+        shared.retain(|_, (first, last)| first < last);
+        let mut item = |design: &DesignChoice| Item {
+            shared: design.identity.filter(|design| shared.contains_key(design)),
             worth: worths.next().unwrap_or_default(),
             demands: columns.iter_mut().map(|column| column.next().unwrap_or_default()).collect(),
         };
         let functions: Vec<Vec<Item>> =
-            functions.iter().map(|designs| designs.iter().map(|_| item()).collect()).collect();
+            functions.iter().map(|designs| designs.iter().map(&mut item).collect()).collect();
         let mut least = vec![vec![BigInt::zero(); whole.len()]];
         for designs in functions.iter().rev() {
             let after = least.last().cloned().unwrap_or_default();
@@ -178,7 +198,7 @@ impl Problem {
             least.push(least_here);
         }
         least.reverse();
-        Self { functions, budgets: whole, least }
+        Self { functions, budgets: whole, least, shared }
     }
 
     fn nothing(&self) -> Label {
@@ -260,9 +280,13 @@ impl Problem {
         let each: Vec<BigInt> =
             best.1.iter().map(|price| BigInt::from((price * unit).min(1e30) as i128)).collect();
         let mut after = vec![BigInt::zero()];
-        for designs in self.functions.iter().rev() {
+        for (at, designs) in self.functions.iter().enumerate().rev() {
             let reduced = designs.iter().map(|item| {
                 let paid: BigInt = item.demands.iter().zip(&each).map(|(demand, price)| demand * price).sum();
+                let first = item.shared.and_then(|design| self.shared.get(&design)).map(|(first, _)| *first);
+                // An earlier function may have paid for the design.
+                let is_paid = first.is_some_and(|first| first < at);
+                let paid = if is_paid { paid.min(BigInt::zero()) } else { paid };
                 (&item.worth << PRICE_BITS) - paid
             });
             let best_value = reduced.max().unwrap_or_default().max(BigInt::zero());
@@ -302,7 +326,9 @@ impl Problem {
                 let extensions =
                     designs.iter().enumerate().map(|(at, item)| label.with(Some(at), Some(item)));
                 for new in limits.watch(extensions.chain([label.with(None, None)])) {
-                    let new = new?;
+                    let mut new = new?;
+                    new.shared
+                        .retain(|design| self.shared.get(design).is_some_and(|(_, last)| *last >= from));
                     let is_worse = |old: &Label| old.worth >= new.worth && old.is_as_free(&new);
                     let is_hopeless = !self.fits(&new, from) || self.bound(&new, from, prices) < target;
                     if is_hopeless || next.iter().any(is_worse) {
@@ -358,11 +384,15 @@ mod tests {
                 .zip(&designs)
                 .filter_map(|(designs, index)| index.map(|index| &designs[index]))
                 .collect();
-            let used: usize = chosen.iter().map(|design| design.components.len()).sum();
+            let mut identities = BTreeSet::new();
+            let is_new =
+                |design: &&&DesignChoice| design.identity.is_none_or(|design| identities.insert(design));
+            let consumers: Vec<&DesignChoice> = chosen.iter().filter(is_new).copied().collect();
+            let used: usize = consumers.iter().map(|design| design.components.len()).sum();
             let different: BTreeSet<usize> =
-                chosen.iter().flat_map(|design| design.components.clone()).collect();
+                consumers.iter().flat_map(|design| design.components.clone()).collect();
             let spent = |budget: usize| {
-                chosen.iter().map(|design| design.demands[budget].clone()).sum::<BigRational>()
+                consumers.iter().map(|design| design.demands[budget].clone()).sum::<BigRational>()
             };
             if used > different.len() || (0..budgets.len()).any(|budget| spent(budget) > budgets[budget]) {
                 continue;
@@ -379,14 +409,27 @@ mod tests {
 
     fn random(random: &mut Random) -> (Vec<Vec<DesignChoice>>, Vec<BigRational>) {
         let budgets: Vec<BigRational> = (0..random.below(3)).map(|_| number(random.below(9))).collect();
+        let design = |random: &mut Random| DesignChoice {
+            missed: random.below(2) as usize,
+            utility: number(random.below(4) - 1),
+            demands: budgets.iter().map(|_| number(random.below(6) - 1)).collect(),
+            components: (0..random.below(3)).map(|_| random.below(4) as usize).collect(),
+            identity: None,
+        };
+        let shared: Vec<DesignChoice> =
+            (0..2).map(|number| DesignChoice { identity: Some(number), ..design(random) }).collect();
         let functions = (0..=random.below(4)).map(|_| {
-            let design = |random: &mut Random| DesignChoice {
-                missed: random.below(2) as usize,
-                utility: number(random.below(4) - 1),
-                demands: budgets.iter().map(|_| number(random.below(6) - 1)).collect(),
-                components: (0..random.below(3)).map(|_| random.below(4) as usize).collect(),
+            let choice = |random: &mut Random| {
+                let new = design(random);
+                let DesignChoice { missed, utility, .. } = &new;
+                match shared.get(random.below(6) as usize) {
+                    Some(design) => {
+                        DesignChoice { missed: *missed, utility: utility.clone(), ..design.clone() }
+                    }
+                    None => new,
+                }
             };
-            (0..random.below(4)).map(|_| design(random)).collect()
+            (0..random.below(4)).map(|_| choice(random)).collect()
         });
         (functions.collect(), budgets.clone())
     }
@@ -431,7 +474,7 @@ mod tests {
                         missed: 0,
                         utility: number(draw),
                         demands: vec![number(draw)],
-                        components: BTreeSet::new(),
+                        ..DesignChoice::default()
                     };
                     (0..=draw.below(3)).map(|_| design(&mut draw)).collect()
                 })
@@ -481,7 +524,7 @@ mod tests {
                 missed: 0,
                 utility: number(*utility),
                 demands: vec![number(*demand as i64)],
-                components: BTreeSet::new(),
+                ..DesignChoice::default()
             };
             let choices: Vec<Vec<DesignChoice>> =
                 functions.iter().map(|designs| designs.iter().map(item).collect()).collect();
@@ -498,7 +541,7 @@ mod tests {
             missed: 0,
             utility: number(utility),
             demands: vec![number(demand)],
-            components: BTreeSet::new(),
+            ..DesignChoice::default()
         };
         let functions = vec![vec![item(9, 5), item(1, 1)], vec![item(9, 5), item(2, 1)]];
         let chosen = configure(&functions, &[number(6)], &Limits::none().with_time(Duration::ZERO));

@@ -22,7 +22,11 @@ pub(crate) fn about(
     let (certified, base) = match (certified, mission.knowledge()) {
         (Some(certified), Some(base)) => (certified, base),
         (None, None) => {
-            let (filled, _) = mission.filled().map_err(|messages| first_message(&messages))?;
+            let (mut filled, _) = mission.filled().map_err(|messages| first_message(&messages))?;
+            if matches!(claim, Claim::Unsolvable) {
+                // The metric does not matter if there is no plan.
+                filled.metric = read_pddl(domain, problem)?.1.metric;
+            }
             let equal = print_domain(mission.domain()) == domain && print_problem(&filled) == problem;
             return if equal { Ok(confirmation) } else { mismatch("domain or problem differ") };
         }
@@ -31,6 +35,11 @@ pub(crate) fn about(
     let origin: Origin =
         serde_json::from_str(certified.origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
     let sources = base.sources();
+    if !sources.are_repeatable() {
+        return Err(
+            "the mission's knowledge base comes from standard input, which cannot be read again".to_owned()
+        );
+    }
     let (document, _) = ontology::convert_files(&sources.documents, &sources.options, OutputSyntax::NTriples)
         .map_err(|_| "the mission's knowledge base cannot be read again".to_owned())?;
     let texts = sources.rules.iter().map(|name| rule_text(name)).collect::<Result<Vec<_>, _>>();

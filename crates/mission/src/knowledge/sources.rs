@@ -31,6 +31,14 @@ pub struct Sources {
     pub limits: Limits,
 }
 
+impl Sources {
+    /// Returns `true` if all sources can be read again, because none of them is standard input.
+    pub fn are_repeatable(&self) -> bool {
+        self.documents.iter().all(|document| document.as_os_str() != "-")
+            && self.rules.iter().all(|rules| rules != "-")
+    }
+}
+
 /// Contents of documents and rule files, before inference.
 pub struct Stated {
     /// Interned names and values.

@@ -33,6 +33,7 @@ use pddl::ast::{
     Action, ActionBody, Arithmetic, Assignment, Condition, ConditionTime, Declaration, Domain, Effect,
     EffectTime, Expression, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
 };
+use pddl::visit::Node;
 
 use crate::binding::{Bindings, add_values, atom, has_value, identifier, is_pddl_name};
 use crate::message::{Errors, Message};
@@ -418,7 +419,7 @@ impl CoAdaptation {
             .enumerate()
             .map(|(position, needed)| {
                 let mut name = Name::new(&format!("fd{}", position + 1));
-                while has_parameter(action, &name) {
+                while has_parameter(action, &name) || has_quantified(&action.body, &name) {
                     name = Name::new(&format!("{name}_"));
                 }
                 action.parameters.push(typed(name.as_str(), DESIGN));
@@ -639,6 +640,19 @@ fn estimated<'a>(designs: impl Iterator<Item = &'a FunctionDesign>) -> BTreeSet<
 
 fn has_parameter(action: &Action, name: &Name) -> bool {
     action.parameters.iter().any(|parameter| parameter.identifier.name == *name)
+}
+
+/// Returns `true` if a quantifier of an action binds a variable of this name.
+fn has_quantified(body: &ActionBody, name: &Name) -> bool {
+    let mut is_bound = false;
+    body.walk(&mut |node| {
+        if let Node::Condition(Condition::Exists(variables, _) | Condition::ForAll(variables, _))
+        | Node::Effect(Effect::ForAll(variables, _)) = node
+        {
+            is_bound |= variables.iter().any(|variable| variable.identifier.name == *name);
+        }
+    });
+    is_bound
 }
 
 /// Returns the name of the predicate of the designs that meet a quality bound. Characters that PDDL does not allow, for

@@ -170,7 +170,10 @@ impl Terms {
     fn constant_of(&mut self, literal: &ontology::Literal, in_rule: bool, property: Option<Name>) -> Name {
         let (datatype, language) = (literal.datatype.as_deref(), literal.language.as_deref());
         let value = Literal::parse(&literal.lexical, datatype, language);
-        self.literals.insert(value.clone(), names::literal(&literal.lexical, datatype));
+        // PLANTA's domains contain `false_boolean`, however the knowledge base spells this value.
+        let lexical: &str =
+            if matches!(value, Literal::Boolean(_)) { &value.lexical() } else { &literal.lexical };
+        self.literals.insert(value.clone(), names::literal(lexical, datatype));
         let name = self.literals.name(&value);
         self.denote(&name, Denoted::Value(value.clone()), property);
         if !value.is_numeric() {
