@@ -269,7 +269,7 @@ impl<A: Action + 'static> Connection<A> {
         let mut goals = self.goals();
         let is_first = goals.is_empty();
         if is_first {
-            // It belonged to one of the earlier goals.
+            // A malformed result belonged to one of the earlier goals.
             goals.malformed = None;
         }
         let (request, goal) = self.client.send_goal(goal)?;
