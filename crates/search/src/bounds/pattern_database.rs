@@ -57,7 +57,7 @@ impl Projection {
         let Context { task, limits } = context;
         let mut projection = Self::without_operators(task, pattern, costs);
         for index in limits.watch(0..task.operators.len()) {
-            projection.add_operator(task, index?);
+            projection.add_operator(task, index?, usize::MAX);
         }
         projection.to_go = projection.goal_distances(costs, limits)?;
         Ok(projection)
@@ -72,13 +72,9 @@ impl Projection {
         operators: &[u32],
         max_size: usize,
     ) -> Option<Self> {
-        let sizes = pattern.iter().map(|variable| task.variables[variable.index()].values.len());
-        if sizes.fold(1, usize::saturating_mul) > max_size {
-            return None;
-        }
         let mut projection = Self::without_operators(task, pattern, costs);
         for index in operators {
-            projection.add_operator(task, *index as usize);
+            projection.add_operator(task, *index as usize, max_size);
             if projection.transition_count() > max_size {
                 return None;
             }
@@ -106,8 +102,9 @@ impl Projection {
         projection
     }
 
-    /// Adds the transitions of an operator. Operators are added in ascending order.
-    fn add_operator(&mut self, task: &Task, index: usize) {
+    /// Adds the transitions of an operator. Operators are added in ascending order. Transitions may be missing if there
+    /// are more than `max_transitions`.
+    fn add_operator(&mut self, task: &Task, index: usize, max_transitions: usize) {
         let operator = &task.operators[index];
         let before = self.required(&operator.condition.facts);
         let after = self.required(&operator.effects);
@@ -120,6 +117,9 @@ impl Projection {
         let touched = !conditional.is_empty() || before.iter().chain(&after).any(Option::is_some);
         if touched {
             for source in self.matching(&before) {
+                if self.transitions.len() > max_transitions {
+                    break;
+                }
                 if conditional.is_empty() {
                     self.transitions.push(Transition { source, target: self.target(source, &after) });
                     continue;
