@@ -270,8 +270,13 @@ impl<'a> Session<'a> {
         } else if let Some(journal) = &mut self.journal {
             journal.reacted(&mut self.control, &mut answers).map_err(|error| unwritten(&error))?;
         }
-        let flow = self.say(&answers)?;
-        self.set_back(&answers);
+        self.say_late(&answers)
+    }
+
+    /// Prints answers to a line that may have arrived long ago, for example because a search was necessary.
+    fn say_late(&mut self, answers: &[Answer]) -> Result<Flow, Failure> {
+        let flow = self.say(answers)?;
+        self.set_back(answers);
         Ok(flow)
     }
 
@@ -318,7 +323,7 @@ impl<'a> Session<'a> {
         if let Some(journal) = &mut self.journal {
             journal.reacted(&mut self.control, &mut answers).map_err(|error| unwritten(&error))?;
         }
-        self.say(&answers)
+        self.say_late(&answers)
     }
 
     /// Returns `true` if deliberation is pending, no action is under way, and the line is about an
@@ -346,9 +351,7 @@ impl<'a> Session<'a> {
         if let Some(mut answers) = self.control.deliberate_at_once() {
             self.search.reset();
             self.decided(&mut answers)?;
-            let flow = self.say(&answers)?;
-            self.set_back(&answers);
-            return Ok(flow);
+            return self.say_late(&answers);
         }
         let thinker = self.control.thinker();
         self.search.begin(thinker.handle());
@@ -370,7 +373,7 @@ impl<'a> Session<'a> {
         };
         self.search.reset();
         self.decided(&mut answers)?;
-        self.say(&answers)
+        self.say_late(&answers)
     }
 
     fn recorded(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {

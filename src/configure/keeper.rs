@@ -219,7 +219,9 @@ impl Keeper {
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);
-        let (time, refusal_of_time) = time_of_line(self.now, now, observation.time);
+        // The time of a line that cannot be understood may be a time of day.
+        let stated_time = observation.time.filter(|_| observation.events.iter().any(Result::is_ok));
+        let (time, refusal_of_time) = time_of_line(self.now, now, stated_time);
         self.now = time;
         // A line that was received before must not have an effect again.
         if let Some(refusal) = observation.sequence.and_then(|seq| self.numbers.refused(seq)) {

@@ -203,7 +203,9 @@ impl Loop {
         // Computed plans that no decision has recorded are obsolete.
         self.planner.computed.clear();
         self.beliefs.lines += u64::from(!observation.is_timer);
-        let (time, refusal_of_time) = time_of_line(self.beliefs.now, now, observation.time);
+        // The time of a line that cannot be understood may be a time of day.
+        let stated_time = observation.time.filter(|_| observation.events.iter().any(Result::is_ok));
+        let (time, refusal_of_time) = time_of_line(self.beliefs.now, now, stated_time);
         self.beliefs.now = time;
         if let Some(refusal) =
             observation.sequence.and_then(|sequence| self.beliefs.numbers.refused(sequence))

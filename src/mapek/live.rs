@@ -95,7 +95,11 @@ impl Live {
     ) -> Option<ReplanOutcome> {
         if rebuild || matches!(self, Self::Untried) {
             let new_replanner = replanner(question.mission, question.problem, query.limits);
-            *self = new_replanner.map_or(Self::Unsuited, Self::Ready);
+            *self = match new_replanner {
+                Some(replanner) => Self::Ready(replanner),
+                None if query.limits.reached() => Self::Untried,
+                None => Self::Unsuited,
+            };
         }
         match self {
             Self::Ready(replanner) => Some(replanner.plan_aloud(query, report)),

@@ -505,6 +505,21 @@ fn several(value: &Value) -> &[Value] {
     }
 }
 
+/// Options whose values are files that a run reads. Files that runs write do not belong to the digest.
+const INPUT_OPTIONS: [&str; 11] = [
+    "adaptation",
+    "assert",
+    "catalog",
+    "entails",
+    "evaluate",
+    "events",
+    "kb",
+    "props",
+    "published",
+    "retract",
+    "rules",
+];
+
 fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) -> String {
     let mut hash = Sha256::new();
     let mut part = |bytes: &[u8]| {
@@ -518,11 +533,13 @@ fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) 
     part(json!(keys).to_string().as_bytes());
     // An option is not the path of a file, but its value may be one.
     let words = sections.command.iter().filter_map(|word| match word.split_once('=') {
-        Some((option, value)) if option.starts_with('-') => Some(value),
+        Some((option, value)) if option.starts_with('-') => {
+            INPUT_OPTIONS.contains(&option.trim_start_matches('-')).then_some(value)
+        }
         _ => Some(word.as_str()).filter(|word| !word.starts_with('-')),
     });
-    let named = sections.placeholders();
-    let options = keys.iter().filter(|(key, _)| !named.contains(key.as_str())).flat_map(|(_, values)| values);
+    let options = keys.iter().filter(|(key, _)| INPUT_OPTIONS.contains(&key.as_str()));
+    let options = options.flat_map(|(_, values)| values);
     let options = options.flat_map(several).filter_map(Value::as_str).map(str::to_owned);
     for word in words.flat_map(|word| instances(word, keys)).chain(options) {
         let path = directory.join(word);
