@@ -122,8 +122,12 @@ impl Label {
         label
     }
 
-    fn is_as_free(&self, other: &Self) -> bool {
-        self.shared == other.shared && self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
+    /// Returns `true` if each completion of `other` that respects the budgets is also one of this label.
+    /// `has_gain`: a design may have a negative demand, from which only its first selection gains.
+    fn is_as_free(&self, other: &Self, has_gain: bool) -> bool {
+        let is_paid =
+            if has_gain { self.shared == other.shared } else { self.shared.is_superset(&other.shared) };
+        is_paid && self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
     }
 }
 
@@ -179,10 +183,13 @@ impl Problem {
             }
         }
         shared.retain(|_, (first, last)| first < last);
-        let mut item = |design: &DesignChoice| Item {
-            shared: design.identity.filter(|design| shared.contains_key(design)),
-            worth: worths.next().unwrap_or_default(),
-            demands: columns.iter_mut().map(|column| column.next().unwrap_or_default()).collect(),
+        let mut item = |design: &DesignChoice| {
+            let demands: Vec<BigInt> =
+                columns.iter_mut().map(|column| column.next().unwrap_or_default()).collect();
+            // It does not matter whether a design that consumes nothing has been selected before.
+            let consumes = demands.iter().any(|demand| !demand.is_zero());
+            let shared = design.identity.filter(|design| consumes && shared.contains_key(design));
+            Item { shared, worth: worths.next().unwrap_or_default(), demands }
         };
         let functions: Vec<Vec<Item>> =
             functions.iter().map(|designs| designs.iter().map(&mut item).collect()).collect();
@@ -314,6 +321,8 @@ impl Problem {
         limits: &Limits,
     ) -> Result<Vec<Option<usize>>, Interrupted> {
         let target: BigInt = &incumbent.worth << PRICE_BITS;
+        let mut demands = self.functions.iter().flatten().flat_map(|item| &item.demands);
+        let has_gain = demands.any(BigInt::is_negative);
         let mut labels = vec![self.nothing()];
         let designs = self.functions.len().saturating_mul(size_of::<Option<usize>>());
         // The digits of a number are stored outside of it.
@@ -329,13 +338,13 @@ impl Problem {
                     let mut new = new?;
                     new.shared
                         .retain(|design| self.shared.get(design).is_some_and(|(_, last)| *last >= from));
-                    let is_worse = |old: &Label| old.worth >= new.worth && old.is_as_free(&new);
+                    let is_worse = |old: &Label| old.worth >= new.worth && old.is_as_free(&new, has_gain);
                     let is_hopeless = !self.fits(&new, from) || self.bound(&new, from, prices) < target;
                     if is_hopeless || next.iter().any(is_worse) {
                         continue;
                     }
                     // Of equally good labels (partial assignments), the older one is preferred and kept.
-                    next.retain(|old| old.worth >= new.worth || !new.is_as_free(old));
+                    next.retain(|old| old.worth >= new.worth || !new.is_as_free(old, has_gain));
                     next.push(new);
                     if next.len().saturating_mul(bytes) > limits.room() {
                         return Err(Interrupted);
@@ -532,6 +541,23 @@ mod tests {
             let (served, utility) = by_amounts(&functions, budget as usize);
             assert!(chosen.optimal);
             assert_eq!((chosen.designs.iter().flatten().count(), chosen.utility), (served, number(utility)));
+        }
+    }
+
+    #[test]
+    fn equal_designs_of_several_objectives_of_one_function_are_no_burden() {
+        for has_component in [false, true] {
+            let design = |identity| DesignChoice {
+                utility: number(1),
+                components: if has_component { vec![identity] } else { Vec::new() },
+                identity: Some(identity),
+                ..DesignChoice::default()
+            };
+            let functions = vec![(0..12).map(design).collect::<Vec<_>>(); 10];
+            let limits = Limits::none().with_time(Duration::from_secs(60));
+            let chosen = configure(&functions, &[], &limits);
+            assert!(chosen.optimal && chosen.utility == number(10), "{has_component}: {chosen:?}");
+            assert_eq!(chosen.designs, vec![Some(0); 10]);
         }
     }
 

@@ -90,7 +90,7 @@ pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], name
     }
 }
 
-/// Declares the undeclared properties of dropped `headers` as annotation properties. Otherwise a reader of the
+/// Declares the properties of dropped `headers` that no other statement describes as annotation properties. Otherwise a reader of the
 /// merged triples would take the annotations of these headers for assertions about individuals. A property that is
 /// also the subject or the object of a statement keeps the kind that follows from its use.
 pub(crate) fn declare_header_annotations(graph: &mut Graph, headers: &HashSet<Iri>) {
