@@ -181,18 +181,17 @@ impl ProvedChecker {
                 parts.dedup();
                 let verified = report.parts.iter().find(|part| part.part == DERIVATIONS);
                 let derivations = verified.map(|_| self.knowledge(directory, stop)).transpose()?;
-                match (verified, &derivations) {
-                    (Some(VerifiedPart { result: Err(_), .. }), Some(Ok(accepted))) => {
-                        format!("the proved checker accepts the derivations ({accepted})")
-                    }
-                    _ => {
-                        let verified = report.parts.iter().find(|part| part.part == FROM_KNOWLEDGE);
-                        let mission = |part: &VerifiedPart| {
-                            self.mission(directory, claim, part.result.is_ok(), folder.path(), stop)
-                        };
-                        let mission = verified.map(mission).transpose()?;
-                        return Ok(Theorem::Holds { name, statement, parts, derivations, mission });
-                    }
+                if let (Some(VerifiedPart { result: Err(_), .. }), Some(Ok(accepted))) =
+                    (verified, &derivations)
+                {
+                    format!("the proved checker accepts the derivations ({accepted})")
+                } else {
+                    let verified = report.parts.iter().find(|part| part.part == FROM_KNOWLEDGE);
+                    let mission = |part: &VerifiedPart| {
+                        self.mission(directory, claim, part.result.is_ok(), folder.path(), stop)
+                    };
+                    let mission = verified.map(mission).transpose()?;
+                    return Ok(Theorem::Holds { name, statement, parts, derivations, mission });
                 }
             }
             Answer::Accepted(statement) => {
