@@ -363,6 +363,10 @@ unlinked origin.json 's/"bindings":{}/"bindings":{"battery_usage":"estimation:sa
 unlinked origin.json 's/"bindings":{}/"bindings":{"functiondesign":"class:Component"}/' \
   'rejected: not covered: battery_usage is a function of functiondesign, and an attribute'
 unlinked origin.json 's/"bindings":{}/"bindings":{"battery_usage":"cost"}/' 'rejected: not covered: the binding cost'
+unlinked origin.json 's/"bindings":{}/"bindings":{"battery_usage":"estimation:safety","Battery_usage":"estimation:battery_usage"}/' \
+  'rejected: origin.json: a name occurs twice'
+unlinked origin.json 's/(robot_at wp1)/(robot_at wp1) (not (fd_available fd_aruco))/' \
+  'rejected: not covered: fd_available in the problem file'
 unlinked origin.json 's/(robot_at wp1)/(robot_at wp1) (fd_available fd_aruco)/' 'rejected: not covered: fd_available in the problem file'
 unlinked origin.json 's/(over all (fd_available ?fd))/(over all (inferred-available ?fd))/' \
   'rejected: not covered, or unknown as a predicate: inferred-available'

@@ -3,9 +3,11 @@
    evidence, and for a front those of check_front.ml. Exit statuses: 0 proved, 30 not proved, 3 rejected. *)
 let check directory evidence_files =
   let read name = Front.read_file (Filename.concat directory name) in
-  let knowledge = Knowledge.knowledge_base (read "knowledge.nt") (read "origin.json") in
-  let derivations = Knowledge.derivations (read "derivations.json") and origin = Json.json (read "origin.json") in
-  let mission_with metric = Mission.read ~derive:Derive.steps ?metric knowledge derivations origin (read "problem.pddl") in
+  (* Each file is read once, so that all steps see the same text. *)
+  let origin_text = read "origin.json" and problem_text = read "problem.pddl" in
+  let knowledge = Knowledge.knowledge_base (read "knowledge.nt") origin_text in
+  let derivations = Knowledge.derivations (read "derivations.json") and origin = Json.json origin_text in
+  let mission_with metric = Mission.read ~derive:Derive.steps ?metric knowledge derivations origin problem_text in
   let { Mission.mission; problem; steps; other_metric } = mission_with None in
   let levels = Knowledge.levels mission.mission_knowledge and orders = Derive.orders mission steps in
   let statement = "proved: for the problem that follows from the knowledge base" in

@@ -96,13 +96,19 @@ let read ~derive ?metric knowledge steps origin problem_text =
   (* Individuals *)
   let pairs name = match optional origin name with
     | None -> []
-    | Some (Object fields) -> List.map (fun (name, value) -> name, string value) fields
+    | Some (Object fields) ->
+      (* Readers of JSON disagree about names that occur twice. *)
+      let names = List.map (fun (name, _) -> String.lowercase_ascii name) fields in
+      if List.length (List.sort_uniq compare names) < List.length names then reject "origin.json: a name occurs twice";
+      List.map (fun (name, value) -> name, string value) fields
     | Some _ -> reject "origin.json: names are expected" in
   let names = all_names () in
   let renamed = List.map (fun (name, object_name) ->
     match List.filter (fun (iri, _) -> iri = name || local_name iri = name) names with
     | [iri, _] -> iri, object_name
     | _ -> reject "not covered: <%s>, which is not the name of one individual" name) (pairs "names") in
+  if List.length (List.sort_uniq compare (List.map fst renamed)) < List.length renamed then
+    reject "origin.json: an individual has two names";
   let called iri = String.lowercase_ascii (match List.assoc_opt iri renamed with Some name -> name | None -> local_name iri) in
   let iri_of = Hashtbl.create 500 in
   List.iter (fun (iri, key) -> Hashtbl.replace iri_of key iri) names;
@@ -186,7 +192,8 @@ let read ~derive ?metric knowledge steps origin problem_text =
   let declared = List.filter_map (function List (Word name :: items) -> Some (name, typed items) | _ -> None) in
   let predicates = declared (all ":predicates" domain) and functions = declared (all ":functions" domain) in
   let initially = List.filter_map (function
-    | List (Word "=" :: List (Word name :: _) :: _) | List (Word name :: _) -> Some name
+    | List (Word "=" :: List (Word name :: _) :: _) | List [Word "not"; List (Word name :: _)] | List (Word name :: _) ->
+      Some name
     | _ -> None) (all ":init" own) in
   let solve p = add (predicate_key p) [[yes (design d); yes (solves d f)] ==> (predicate_key p, [d; f])]
   and avail p = add (predicate_key p) [is_available d ==> (predicate_key p, [d])] in
@@ -220,6 +227,8 @@ let read ~derive ?metric knowledge steps origin problem_text =
     rules := rule :: !rules) names;
   let estimated_kinds name = match attribute_named name with
     | [] when starts "fd_" name -> attribute_named (local "fd_" name)
+    | _ :: _ when starts "fd_" name && attribute_named (local "fd_" name) <> [] ->
+      reject "not covered: two attributes for %s" name
     | kinds -> kinds in
   List.iter (fun (name, parameters) ->
     let by_name make = binding (fun name -> Some (make name)) name in

@@ -15,7 +15,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use ::verify::front::{member_directory, read_members};
-use ::verify::manifest::PLAN;
+use ::verify::manifest::{FRONT as FRONT_FILE, PLAN};
 use ::verify::{Claim, Verification, VerifiedPart};
 
 use crate::message::Message;
@@ -329,12 +329,14 @@ enum Ended {
 /// Returns an error if the programs would open a file of the certificate that `metaplan-verify` has not read: it could
 /// be a link or a pipe.
 fn require_read(directory: &Path, claim: &Claim) -> Result<(), String> {
-    match claim {
-        Claim::Front(front) => read_members(directory, front),
-        Claim::Unsolvable if directory.join(PLAN).symlink_metadata().is_ok() => {
-            Err(format!("`{PLAN}` does not belong to the certificate"))
-        }
-        Claim::Unsolvable | Claim::Optimal { .. } => Ok(()),
+    let foreign = match claim {
+        Claim::Front(front) => return read_members(directory, front),
+        Claim::Optimal { .. } => &[FRONT_FILE][..],
+        Claim::Unsolvable => &[PLAN, FRONT_FILE][..],
+    };
+    match foreign.iter().find(|name| directory.join(name).symlink_metadata().is_ok()) {
+        Some(name) => Err(format!("`{name}` does not belong to the certificate")),
+        None => Ok(()),
     }
 }
 
