@@ -88,8 +88,8 @@ pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Mess
     }
     let omitted = counts.into_iter().filter(|(_, count)| *count > KIND_LIMIT);
     for (code, count) in omitted {
-        let all = "`--format json` of `lint`, `configure` and `reason` lists all";
-        let _ = writeln!(stderr, "… and {} more {code}; {all}", count - KIND_LIMIT);
+        let remedy = "`--format json` of `lint`, `configure` and `reason` lists all";
+        let _ = writeln!(stderr, "… and {} more {code}; {remedy}", count - KIND_LIMIT);
     }
 }
 
