@@ -111,15 +111,15 @@ def ferroplan_answer(output, code, _=None):
     """It has no option for a limit, and says nothing about costs."""
     if code in (124, -9, 137) or code != 0 and not output.strip():
         return Answer("limit")
-    if "{" not in output:
+    if not output.lstrip().startswith("{"):
         return Answer("refused" if re.search(r"unsupported|not supported|parse", output, re.IGNORECASE) else "error")
-    told = json.loads(output[output.index("{"):output.rindex("}") + 1])
+    told = json.loads(output[:output.rindex("}") + 1])
     if not told.get("solved"):
         return Answer("limit")
     lines = []
     for step in told["plan"]["steps"]:
-        action = f"({' '.join([step['action'], *step['args']])})"
-        lines.append(f"{step['time']:.6f}: {action} [{step['duration']:.6f}]" if "time" in step else action)
+        action = f"({' '.join([step['action'], *step.get('args', [])])})"
+        lines.append(f"{step['time']:.6f}: {action} [{step.get('duration', 0):.6f}]" if "time" in step else action)
     return Answer("plan", None, lines)
 
 
