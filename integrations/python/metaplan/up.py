@@ -40,6 +40,7 @@ from unified_planning.engines.mixins import AnytimePlannerMixin, OneshotPlannerM
 from unified_planning.io import PDDLWriter
 from unified_planning.io.pddl_writer import ConverterToPDDLString
 from unified_planning.model import DurativeAction, EndTiming, Fluent, FNode, Problem, ProblemKind, StartTiming
+from unified_planning.model.fluent import get_all_fluent_exp
 from unified_planning.model.metrics import MinimizeActionCosts
 from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, TimeTriggeredPlan
 
@@ -153,21 +154,36 @@ def _exact(method: Any) -> FunctionType:
     return FunctionType(method.__code__, names, method.__name__, method.__defaults__, method.__closure__)
 
 
-def _with_guards(problem: Problem) -> Problem:
-    """Returns a copy in which an action cannot start while it is running with the same arguments; in PDDL it can."""
-    guarded = problem.clone()
+def _is_positive(problem: Problem, number: FNode, or_zero: bool) -> bool:
+    """Returns whether a number is shown to be greater than 0, or at least 0: a constant, or a fluent with such initial values."""
+    values = [number]
+    if number.is_fluent_exp() and number.fluent() in problem.get_static_fluents():
+        found = [problem.initial_value(each) for each in get_all_fluent_exp(problem, number.fluent())]
+        # An undefined number has no value, and an action with such a duration is never applicable.
+        values = [value for value in found if value is not None]
+    if not all(value.is_constant() for value in values):
+        return False
+    return all(value.constant_value() >= 0 if or_zero else value.constant_value() > 0 for value in values)
+
+
+def _with_guards(problem: Problem) -> tuple[Problem, bool]:
+    """Returns a copy in which an action cannot start while it is running with the same arguments; in PDDL it can.
+
+    The second value is ``False`` if the copy lacks runs without duration that the problem may have.
+    """
+    guarded, is_complete = problem.clone(), True
     manager, fluents_of = problem.environment.expression_manager, problem.environment.free_vars_extractor
     static = problem.get_static_fluents()
     for action in guarded.actions:
         if not isinstance(action, DurativeAction):
             continue
-        duration = action.duration
-        lasts = manager.TRUE() if duration.is_left_open() else manager.GT(duration.lower, 0).simplify()
+        duration, lasts = action.duration, manager.TRUE()
         # Start and end of a run without duration are one happening, which cannot set the guard and reset it.
-        is_known = duration.lower == duration.upper and all(each.fluent() in static for each in fluents_of.get(lasts))
-        if not lasts.is_true() and not is_known:
-            text = f"the duration of {action.name} is chosen or changes, may be 0, and self_overlapping is False"
-            raise up.exceptions.UPUnsupportedProblemTypeError(text)
+        if not _is_positive(problem, duration.lower, or_zero=duration.is_left_open()):
+            if duration.lower == duration.upper and all(each.fluent() in static for each in fluents_of.get(duration.lower)):
+                lasts = manager.GT(duration.lower, 0).simplify()
+            else:
+                is_complete = False
         if lasts.is_false():
             continue
         name = get_fresh_name(guarded, f"running_{action.name}")
@@ -177,7 +193,7 @@ def _with_guards(problem: Problem) -> Problem:
         action.add_condition(StartTiming(), manager.Not(running))
         action.add_effect(StartTiming(), running, True, lasts)
         action.add_effect(EndTiming(), running, False, lasts)
-    return guarded
+    return guarded, is_complete
 
 
 def _with_all_costs(problem: Problem, costs: MinimizeActionCosts) -> Problem:
@@ -210,10 +226,10 @@ class _Writer(PDDLWriter):
                 # A goal with a negative gain is replaced by its negation with a positive gain.
                 goal = manager.auto_promote(goal)[0]
                 self._optional.append((goal, Fraction(gain)) if gain >= 0 else (manager.Not(goal), -Fraction(gain)))
-        self._unguarded = problem
+        self._unguarded, self.is_complete = problem, True
         metrics = problem.quality_metrics
         if guards:
-            problem = _with_guards(problem)
+            problem, self.is_complete = _with_guards(problem)
         # The writer rejects several metrics. Costs are defined for actions without guards.
         if len(metrics) == 1 and metrics[0].is_minimize_action_costs():
             if guards or any(metrics[0].get_action_cost(action) is None for action in problem.actions):
@@ -305,6 +321,14 @@ _STATUSES = {
     "unsolvable_within_horizon": PlanGenerationResultStatus.UNSOLVABLE_INCOMPLETELY,
     "unknown": PlanGenerationResultStatus.TIMEOUT,
 }
+
+_CLAIMS = {
+    PlanGenerationResultStatus.SOLVED_OPTIMALLY: PlanGenerationResultStatus.SOLVED_SATISFICING,
+    PlanGenerationResultStatus.UNSOLVABLE_PROVEN: PlanGenerationResultStatus.UNSOLVABLE_INCOMPLETELY,
+}
+"""Statuses that claim something about all plans, with those that remain if some plans are left out."""
+
+_LEFT_OUT = "(among plans without runs of duration 0 of actions whose duration is chosen or changes)"
 
 _UNPROVED = (
     PlanGenerationResultStatus.SOLVED_SATISFICING,
@@ -432,15 +456,19 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, str(error))
         except (up.exceptions.UPException, NotImplementedError) as error:
             return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, str(error) or repr(error))
+        is_complete = written.writer.is_complete
+        verdict = found.verdict if is_complete else f"{found.verdict} {_LEFT_OUT}"
         if output_stream is not None:
-            output_stream.write(f"{found.verdict}\n")
+            output_stream.write(f"{verdict}\n")
         status = _STATUSES[found.status]
         if status == PlanGenerationResultStatus.TIMEOUT:
             status = self._limit_status(began, timeout)
         if found and status == PlanGenerationResultStatus.SOLVED_OPTIMALLY and not problem.quality_metrics:
             status = PlanGenerationResultStatus.SOLVED_SATISFICING
+        if not is_complete:
+            status = _CLAIMS.get(status, status)
         metrics = {"engine_internal_time": str(time.monotonic() - began), "horizon": str(found.horizon)}
-        for name, value in (("cost", found.cost), ("lower_bound", found.lower_bound)):
+        for name, value in (("cost", found.cost), ("lower_bound", found.lower_bound if is_complete else None)):
             if value is not None:
                 metrics[name] = str(value)
         if options.get("certificate"):
@@ -450,12 +478,13 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             written.plan(found) if found else None,
             engine_name=self.name,
             metrics=metrics,
-            log_messages=[LogMessage(LogLevel.INFO, found.verdict)],
+            log_messages=[LogMessage(LogLevel.INFO, verdict)],
         )
 
     def _limit_status(self, began: float, timeout: float | None) -> PlanGenerationResultStatus:
-        """Returns the status of a search that a limit has ended now: that on memory if there is one and the time is not over."""
-        is_over = timeout is not None and time.monotonic() - began >= timeout
+        """Returns the status of a search that a limit has ended now: that on memory if there is one and half of the time is left."""
+        # A search may end a moment before its time limit.
+        is_over = timeout is not None and time.monotonic() - began >= timeout / 2
         if is_over or self._options["memory_limit"] is None:
             return PlanGenerationResultStatus.TIMEOUT
         return PlanGenerationResultStatus.MEMOUT

@@ -261,13 +261,86 @@ def test_a_problem_with_many_arguments_is_written_fast():
     assert "running_visit" not in written.writer.get_problem()
 
 
-def test_chosen_durations_must_be_positive_unless_runs_may_overlap():
-    for least, status in ((1, SOLVED), (0, (Status.UNSUPPORTED_PROBLEM,))):
-        problem = production(5, False)
-        problem.action("produce").set_closed_duration_interval(least, 3)
-        with OneshotPlanner(name="metaplan") as planner:
-            planner.skip_checks = True
-            assert planner.solve(problem, timeout=600).status in status
+def solve_undeclared(problem):
+    with OneshotPlanner(name="metaplan") as planner:
+        planner.skip_checks = True
+        return planner.solve(problem, timeout=5)
+
+
+def overlaps(plan):
+    """Returns ``True`` if two runs with the same arguments overlap."""
+    runs = sorted((start, start + duration, str(step)) for start, step, duration in plan.timed_actions if duration is not None)
+    return any(own[2] == other[2] and other[0] < own[1] for index, own in enumerate(runs) for other in runs[index + 1 :])
+
+
+@pytest.mark.parametrize(
+    ("least", "is_open", "is_complete"),
+    [(1, False, True), (0, False, False), (0, True, True), (-1, True, False)],
+)
+def test_chosen_durations_that_may_be_0_restrict_the_claims(least, is_open, is_complete):
+    problem = production(5, False)
+    interval = "left_open" if is_open else "closed"
+    getattr(problem.action("produce"), f"set_{interval}_duration_interval")(least, 3)
+    assert metaplan.up._Written(problem).writer.is_complete == is_complete
+    result = solve_undeclared(problem)
+    assert result.status in (SOLVED if is_complete else SOLVED[:1])
+    assert is_valid(problem, result.plan) and not overlaps(result.plan)
+    assert is_complete or "lower_bound" not in result.metrics
+    assert ("without runs of duration 0" in result.log_messages[0].message) == (not is_complete)
+
+
+@pytest.mark.parametrize(("durations", "is_complete"), [((5, 3), True), ((3, 0), False)])
+def test_initial_values_show_that_chosen_durations_are_positive(durations, is_complete):
+    problem = production(1, False)
+    problem.clear_actions()
+    machine = up.shortcuts.UserType("machine")
+    lasts = problem.add_fluent("lasts", up.shortcuts.RealType(), machine=machine)
+    produce = up.model.DurativeAction("produce", machine=machine)
+    produce.set_closed_duration_interval(lasts(produce.machine), up.shortcuts.Times(2, lasts(produce.machine)))
+    produce.add_increase_effect(up.shortcuts.EndTiming(), problem.fluent("count"), 1)
+    problem.add_action(produce)
+    for number, duration in enumerate(durations):
+        problem.set_initial_value(lasts(problem.add_object(f"machine{number}", machine)), duration)
+    assert metaplan.up._Written(problem).writer.is_complete == is_complete
+    result = solve_undeclared(problem)
+    assert result.status in SOLVED and is_valid(problem, result.plan) and not overlaps(result.plan)
+
+
+@pytest.mark.parametrize("self_overlapping", [False, True])
+@pytest.mark.parametrize("goal", ["count", "never"])
+def test_durations_that_actions_change_are_solved(self_overlapping, goal):
+    """The first run lasts 2, the second 3."""
+    problem = Problem("wear")
+    problem.self_overlapping = self_overlapping
+    worn = problem.add_fluent("worn", up.shortcuts.RealType(), default_initial_value=2)
+    reached = [problem.add_fluent(name, default_initial_value=False) for name in ("first", "count", "never")]
+    produce = up.model.DurativeAction("produce")
+    produce.set_fixed_duration(worn)
+    produce.add_effect(up.shortcuts.EndTiming(), reached[1], True, reached[0])
+    produce.add_effect(up.shortcuts.EndTiming(), reached[0], True)
+    produce.add_effect(up.shortcuts.EndTiming(), worn, 3)
+    problem.add_action(produce)
+    problem.add_goal(problem.fluent(goal))
+    problem.add_quality_metric(up.model.metrics.MinimizeMakespan())
+    assert metaplan.up._Written(problem).writer.is_complete == self_overlapping
+    result = solve_undeclared(problem)
+    if goal == "never":
+        proved = Status.UNSOLVABLE_PROVEN if self_overlapping else Status.UNSOLVABLE_INCOMPLETELY
+        assert result.status == proved and result.plan is None
+        return
+    assert result.status in (SOLVED if self_overlapping else SOLVED[:1]) and is_valid(problem, result.plan)
+    if not self_overlapping:
+        assert [duration for _, _, duration in result.plan.timed_actions] == [2, 3] and not overlaps(result.plan)
+
+
+@pytest.mark.parametrize(
+    ("used", "memory_limit", "status"),
+    [(0.9, 100, Status.TIMEOUT), (0.6, 100, Status.TIMEOUT), (0.3, 100, Status.MEMOUT), (0.3, None, Status.TIMEOUT)],
+)
+def test_memory_has_ended_a_search_only_if_time_was_left(used, memory_limit, status):
+    engine = metaplan.up.MetaplanEngine(memory_limit=memory_limit)
+    assert engine._limit_status(time.monotonic() - 100 * used, 100) == status
+    assert memory_limit is None or engine._limit_status(time.monotonic() - 100 * used, None) == Status.MEMOUT
 
 
 def test_discrete_time_is_refused():
