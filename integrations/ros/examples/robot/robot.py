@@ -118,7 +118,7 @@ class Base(Node):
         if event["answer"] == "begin_action" and event["action"] != self.action:
             self.action = event["action"]
             threading.Thread(target=self.perform, args=(self.action, event["name"], event["arguments"]), daemon=True).start()
-        elif event["answer"] == "stop_action":
+        elif event["answer"] == "stop_action" and event["action"] == self.action:
             self.action = None
         elif event["answer"] == "goal_reached":
             say("the round is done")

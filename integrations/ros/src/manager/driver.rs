@@ -202,8 +202,13 @@ impl Driver {
             _ => format!("{silent} of {} functions do not report their modes", modes.len()),
         };
         self.node.log(Severity::Info, &text);
-        self.handle(Input::Ready(modes))?;
         // The calls above take seconds. What has arrived meanwhile must not be handled before the older inputs.
+        delayed.extend(inputs.try_iter());
+        // No action may begin if the autopilot has already reported that it accepts no commands.
+        if let Some(mode) = last_autopilot_mode(&mut delayed) {
+            self.handle(mode)?;
+        }
+        self.handle(Input::Ready(modes))?;
         delayed.extend(inputs.try_iter());
         for input in delayed {
             let _ = sender.send(input);
@@ -344,8 +349,16 @@ impl Driver {
     }
 }
 
+/// Removes the reports of the autopilot's mode, and returns the last one.
+fn last_autopilot_mode(delayed: &mut Vec<Input>) -> Option<Input> {
+    let is_mode = |input: &Input| matches!(input, Input::Autopilot(_));
+    let last = delayed.iter().rposition(is_mode).map(|at| delayed.remove(at));
+    delayed.retain(|input| !is_mode(input));
+    last
+}
+
 /// Returns the inputs that arrive until the node is active, `stop` is set, or there are [`MAX_DELAYED_INPUTS`]. Of the
-/// progress of an action, only the last report is returned. Calls `idle` at least every 50 ms, with the number of a
+/// progress of an action and of the autopilot's mode, only the last report is returned. Calls `idle` at least every 50 ms, with the number of a
 /// request that must be refused, if there is one.
 fn delayed_inputs(
     inputs: &Receiver<Input>,
@@ -359,10 +372,12 @@ fn delayed_inputs(
         match inputs.recv_timeout(Duration::from_millis(50)) {
             Ok(Input::Request(number, _) | Input::Cancel(number, _)) => idle(Some(number)),
             Ok(input) => {
-                if let Input::Progress(number, _) = input {
-                    delayed.retain(
+                match input {
+                    Input::Progress(number, _) => delayed.retain(
                         |earlier| !matches!(earlier, Input::Progress(action, _) if *action == number),
-                    );
+                    ),
+                    Input::Autopilot(_) => delayed.retain(|earlier| !matches!(earlier, Input::Autopilot(_))),
+                    _ => {}
                 }
                 delayed.push(input);
                 idle(None);
@@ -379,7 +394,7 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::sync::mpsc;
 
-    use super::delayed_inputs;
+    use super::{delayed_inputs, last_autopilot_mode};
     use crate::manager::machine::Input;
 
     #[test]
@@ -413,5 +428,33 @@ mod tests {
             panic!("{delayed:?}");
         };
         assert_eq!((third.to_string(), fourth.to_string()), ("0.99".to_owned(), "0.99".to_owned()));
+    }
+
+    fn mode(mode: &str) -> Input {
+        Input::Autopilot(mode.to_owned())
+    }
+
+    #[test]
+    fn only_the_last_mode_of_the_autopilot_waits_for_the_activation() {
+        let (sender, inputs) = mpsc::channel();
+        for input in [mode("MANUAL"), Input::Tick, mode("GUIDED")] {
+            sender.send(input).expect("a receiver");
+        }
+        drop(sender);
+        let (active, stop) = (AtomicBool::new(false), AtomicBool::new(false));
+        let delayed = delayed_inputs(&inputs, &active, &stop, |_| {});
+        assert!(
+            matches!(&delayed[..], [Input::Tick, Input::Autopilot(mode)] if mode == "GUIDED"),
+            "{delayed:?}"
+        );
+    }
+
+    #[test]
+    fn the_last_mode_of_the_autopilot_precedes_the_start() {
+        let mut delayed = vec![mode("GUIDED"), Input::Tick, mode("MANUAL"), Input::Diagnosed];
+        let last = last_autopilot_mode(&mut delayed);
+        assert!(matches!(&last, Some(Input::Autopilot(mode)) if mode == "MANUAL"), "{last:?}");
+        assert!(matches!(delayed[..], [Input::Tick, Input::Diagnosed]), "{delayed:?}");
+        assert!(last_autopilot_mode(&mut delayed).is_none());
     }
 }

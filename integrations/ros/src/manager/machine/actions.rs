@@ -4,12 +4,13 @@
 use metaplan::mapek::Event;
 use serde_json::json;
 
-use crate::manager::machine::Machine;
 use crate::manager::machine::io::{Ended, Output};
+use crate::manager::machine::{Action, Machine};
 
 impl Machine {
     /// Starts the requested action if its functions have the required designs, no mode request is pending,
-    /// the action is neither suspended nor being cancelled, and the autopilot accepts commands.
+    /// the action is neither suspended nor being cancelled, and the autopilot accepts commands. If only the autopilot
+    /// does not, the action is reported as started and waits: the loop would cancel an unacknowledged request.
     pub(super) fn begin(&mut self) {
         let beliefs = self.control.beliefs();
         let has = |(function, design): &(String, String)| {
@@ -17,15 +18,16 @@ impl Machine {
         };
         let is_ready = beliefs.running().is_some_and(|(_, step)| step.configuration.iter().all(has))
             && !beliefs.suspended()
-            && !beliefs.cancelling()
-            && self.autopilot_obeys;
+            && !beliefs.cancelling();
         if !self.pending.is_empty() || !is_ready {
             return;
         }
         let Some(action) = self.action.as_mut().filter(|action| !action.begun) else { return };
-        (action.begun, action.is_lost) = (true, false);
-        let (number, effect, call) = (action.number, action.effect, action.call.clone());
-        self.outputs.push(Output::Perform(number, call));
+        let (number, effect) = (action.number, action.effect.take());
+        if self.autopilot_obeys {
+            (action.begun, action.is_lost) = (true, false);
+            self.outputs.push(Output::Perform(number, action.call.clone()));
+        }
         if let Some(effect) = effect {
             self.acknowledge(effect);
             self.queue(&Event::Started { action: number });
@@ -34,10 +36,14 @@ impl Machine {
 
     /// Ends the action under way if the loop has suspended it, or if the autopilot no longer accepts commands.
     /// Performers cannot pause, and an action that goes on would move the robot without its designs or against the
-    /// pilot. The performer reports the action as cancelled.
+    /// pilot. The performer reports the action as cancelled. The performer of an action of the previous run may still be
+    /// working, too.
     pub(super) fn stop_interrupted(&mut self) {
         let is_interrupted = self.control.beliefs().suspended() || !self.autopilot_obeys;
-        if let Some(action) = self.action.as_mut().filter(|action| is_interrupted && action.begun)
+        let is_ready = self.deferred.is_none();
+        let is_performed = |action: &&mut Action| action.begun || is_ready && action.is_lost;
+        if let Some(action) = self.action.as_mut().filter(is_performed)
+            && is_interrupted
             && !std::mem::replace(&mut action.is_stopped, true)
         {
             self.outputs.push(Output::Stop(action.number));

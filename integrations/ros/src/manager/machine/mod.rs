@@ -31,7 +31,7 @@ const EMPTY_GOAL: &str = "(and)";
 struct Action {
     number: u64,
     call: Call,
-    /// Effect that requests the action. `None` for an action that the previous run has begun.
+    /// Effect that requests the action. `None` if it is acknowledged.
     effect: Option<u64>,
     begun: bool,
     /// `true` for an action of the previous run until it is performed again.
@@ -39,6 +39,15 @@ struct Action {
     /// `true` once a request to end the action was sent to the performer, because the loop has suspended the action or
     /// the task has ended.
     is_stopped: bool,
+}
+
+/// Request to start a task that waits until the autopilot accepts commands.
+#[derive(Debug)]
+struct HeldRequest {
+    /// Number of the wait after which the task is refused.
+    wait: u64,
+    number: u64,
+    task: String,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -74,11 +83,12 @@ pub(super) struct Machine {
     modes: BTreeMap<String, String>,
     grants: BTreeMap<String, Grant>,
     action: Option<Action>,
-    /// Number of waits for the end of an action whose task has ended.
+    /// Number of waits that have begun, see [`Output::Await`].
     waits: u64,
-    /// Number of the present wait.
+    /// Number of the present wait for the end of an action whose task has ended.
     ending: Option<u64>,
     start_requests: Vec<u64>,
+    held_requests: Vec<HeldRequest>,
     end_requests: Vec<u64>,
     failures: BTreeMap<String, CallFailures>,
     without_plan: bool,
@@ -116,6 +126,7 @@ impl Machine {
             waits: 0,
             ending: None,
             start_requests: Vec::new(),
+            held_requests: Vec::new(),
             end_requests: Vec::new(),
             failures: BTreeMap::new(),
             without_plan: false,
@@ -351,7 +362,10 @@ impl Machine {
                 match &self.action {
                     // The performer reports the end.
                     Some(action) if action.begun => self.outputs.push(Output::Stop(action.number)),
-                    _ => self.queue(&Event::Cancelled { action: effect.action }),
+                    _ => {
+                        self.drop_lost_action();
+                        self.queue(&Event::Cancelled { action: effect.action });
+                    }
                 }
             }
             // An action is begun or stopped once all answers are handled.

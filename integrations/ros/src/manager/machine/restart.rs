@@ -7,7 +7,7 @@ use std::time::Duration;
 use metaplan::mapek::{Command, Effect, Event};
 use metaplan::message::Message;
 
-use crate::manager::machine::io::State;
+use crate::manager::machine::io::{Output, State};
 use crate::manager::machine::{Action, Deferred, EMPTY_GOAL, Machine, call, unwritten};
 
 /// Time to wait for new diagnostics after a restart, before the modes found at the start are evaluated. Without the wait,
@@ -85,12 +85,20 @@ impl Machine {
         let lost = self.action.as_ref().filter(|action| action.is_lost);
         let Some(number) = lost.map(|action| action.number) else { return };
         if running != Some(number) {
-            self.action = None;
+            self.drop_lost_action();
         } else if is_of_ended_task {
             self.end_action();
         } else if is_interrupted {
-            self.action = None;
+            self.drop_lost_action();
             self.queue(&Event::Cancelled { action: number });
+        }
+    }
+
+    /// Drops the action of the previous run, and requests its end: a node that performs actions on the events
+    /// `begin_action` and `stop_action` may still be working.
+    pub(super) fn drop_lost_action(&mut self) {
+        if let Some(action) = self.action.take_if(|action| action.is_lost) {
+            self.outputs.push(Output::Stop(action.number));
         }
     }
 }

@@ -8,12 +8,16 @@ use metaplan::message::did_you_mean;
 use serde_json::json;
 
 use crate::manager::machine::io::{Output, State};
-use crate::manager::machine::{EMPTY_GOAL, Machine};
+use crate::manager::machine::{EMPTY_GOAL, HeldRequest, Machine};
 use crate::manager::settings::fact_value;
 
 /// Time to wait for the end of the action of a task that has ended. Clients such as SUAVE's mission node wait five
 /// seconds for the reply, even if time is simulated.
 const STOP_WAIT: Duration = Duration::from_secs(3);
+
+/// Time for which a requested task waits until the autopilot accepts commands. MAVROS reports the mode once per second,
+/// so a client that has just changed the mode may request its task before the manager receives the report.
+const MODE_WAIT: Duration = Duration::from_secs(2);
 
 impl Machine {
     pub(super) fn reply(&mut self) {
@@ -41,15 +45,14 @@ impl Machine {
             self.refuse(&because);
             return because;
         };
-        let obstacle = match self.state {
-            State::WaitGraph => Some("functions are missing"),
-            _ => (!self.autopilot_obeys).then_some("the autopilot accepts no commands in its mode"),
-        };
-        if let Some(obstacle) = obstacle {
-            self.outputs.push(Output::Reply(number, false));
-            let because = format!("the task {task} is requested, and {obstacle}");
-            self.refuse(&because);
-            return because;
+        if self.state == State::WaitGraph {
+            return self.refuse_request(number, task, "functions are missing");
+        }
+        if !self.autopilot_obeys {
+            self.waits += 1;
+            self.outputs.push(Output::Await(self.waits, MODE_WAIT));
+            self.held_requests.push(HeldRequest { wait: self.waits, number, task: task.to_owned() });
+            return format!("the task {task} waits for the autopilot");
         }
         self.start_requests.push(number);
         if self.task.as_deref() != Some(task) {
@@ -64,6 +67,13 @@ impl Machine {
         format!("the task {task} is requested")
     }
 
+    fn refuse_request(&mut self, number: u64, task: &str, obstacle: &str) -> String {
+        self.outputs.push(Output::Reply(number, false));
+        let because = format!("the task {task} is requested, and {obstacle}");
+        self.refuse(&because);
+        because
+    }
+
     pub(super) fn refuse(&mut self, because: &str) {
         self.outputs.push(Output::Event(json!({"answer": "refused", "because": because})));
         self.outputs.push(Output::Warn(because.to_owned()));
@@ -76,6 +86,10 @@ impl Machine {
             self.refuse(&because);
             return because;
         }
+        for held in self.held_requests.iter().filter(|held| held.task == task) {
+            self.outputs.push(Output::Reply(held.number, false));
+        }
+        self.held_requests.retain(|held| held.task != task);
         let beliefs = self.control.beliefs();
         let pursues_goal_of_problem = self.task.is_none()
             && beliefs.goal().is_none()
@@ -111,6 +125,7 @@ impl Machine {
 
     /// Ends the action of a task that has ended, and withdraws the designs of all functions.
     pub(super) fn end_action(&mut self) {
+        self.drop_lost_action();
         self.action = None;
         if let Some((action, _)) = self.control.beliefs().running() {
             self.queue(&Event::Cancelled { action });
@@ -125,10 +140,15 @@ impl Machine {
         }
     }
 
-    /// Ends an action whose performer has not reported its end in time after the end of the task.
+    /// Handles the end of a wait: refuses a task that waits for the autopilot, or ends an action whose performer has not
+    /// reported its end in time after the end of the task.
     pub(super) fn abandon(&mut self, wait: u64) -> String {
+        if let Some(at) = self.held_requests.iter().position(|held| held.wait == wait) {
+            let HeldRequest { number, task, .. } = self.held_requests.remove(at);
+            return self.refuse_request(number, &task, "the autopilot accepts no commands in its mode");
+        }
         if self.ending != Some(wait) {
-            return "the action has ended in time".to_owned();
+            return "nothing waits any more".to_owned();
         }
         for request in std::mem::take(&mut self.end_requests) {
             self.outputs.push(Output::Reply(request, false));
@@ -142,6 +162,7 @@ impl Machine {
 
     pub(super) fn reached(&mut self) {
         self.without_plan = false;
+        self.drop_lost_action();
         self.action = None;
         let has_acted = std::mem::take(&mut self.has_acted);
         if self.task.take().is_none() && !has_acted {
@@ -161,11 +182,16 @@ impl Machine {
     }
 
     /// Ends the task if the autopilot accepts no commands in its mode. A mission with its own goal has no task: its action
-    /// is stopped, and the next one waits.
+    /// is stopped, and the next one waits. If the autopilot accepts commands, handles the tasks that wait for it.
     pub(super) fn autopilot(&mut self, mode: &str) -> String {
         self.autopilot_obeys = self.accepts_commands(mode);
         if let Some(task) = self.task.clone().filter(|_| !self.autopilot_obeys) {
             self.cancel(None, &task);
+        }
+        if self.autopilot_obeys {
+            for HeldRequest { number, task, .. } in std::mem::take(&mut self.held_requests) {
+                self.request(number, &task);
+            }
         }
         format!("the autopilot is in the mode {mode}")
     }

@@ -142,6 +142,16 @@ fn performed(outputs: &[Output]) -> Vec<&str> {
     actions
 }
 
+fn stopped(outputs: &[Output]) -> Vec<u64> {
+    let mut actions = Vec::new();
+    for output in outputs {
+        if let Output::Stop(number) = output {
+            actions.push(*number);
+        }
+    }
+    actions
+}
+
 #[test]
 fn a_task_is_granted_when_its_functions_have_their_designs() {
     let mut robot = Robot::new(None);
@@ -438,11 +448,27 @@ fn a_task_ends_when_the_autopilot_no_longer_obeys() {
     robot.obey(outputs);
     assert_eq!(robot.machine.state(), State::Idle);
     // In this mode, no task is granted.
-    let outputs = robot.request("search_pipeline");
+    let wait = |number| [Output::Await(number, Duration::from_secs(2))];
+    assert_eq!(robot.request("search_pipeline"), wait(2));
+    assert_eq!(robot.autopilot("MANUAL"), []);
+    let outputs = robot.handle(Input::Overdue(2));
     assert!(matches!(&outputs[..], [Output::Reply(7, false), Output::Warn(_)]), "{outputs:?}");
-    robot.autopilot("GUIDED");
-    let outputs = robot.request("search_pipeline");
-    assert_eq!(performed(&robot.obey(outputs)), ["search_pipeline"]);
+    assert_eq!(robot.request("search_pipeline"), wait(3));
+    assert_eq!(robot.cancel("search_pipeline"), [Output::Reply(7, false), Output::Reply(8, true)]);
+    assert_eq!(robot.autopilot("GUIDED"), []);
+}
+
+#[test]
+fn a_task_waits_for_the_report_that_the_autopilot_obeys() {
+    let mut robot = Robot::new(None);
+    robot.autopilot("MANUAL");
+    robot.request("search_pipeline");
+    let outputs = robot.autopilot("GUIDED");
+    let outputs = robot.obey(outputs);
+    assert_eq!(performed(&outputs), ["search_pipeline"]);
+    assert!(outputs.contains(&Output::Reply(7, true)), "{outputs:?}");
+    assert_eq!(robot.handle(Input::Overdue(1)), []);
+    assert_eq!(robot.machine.state(), State::Execute);
 }
 
 #[test]
@@ -455,6 +481,7 @@ fn a_task_ends_if_the_autopilot_has_left_its_mode_during_a_restart() {
     let mut robot = Robot::restarted(directory.path());
     robot.ready(searching);
     let outputs = robot.autopilot("MANUAL");
+    assert_eq!(stopped(&outputs), [1], "a node may still perform it");
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
     assert_eq!((robot.machine.state(), robot.machine.task()), (State::Idle, None));
@@ -463,12 +490,27 @@ fn a_task_ends_if_the_autopilot_has_left_its_mode_during_a_restart() {
 /// Creates a machine for the goal of a problem, and returns it with the outputs of its start. Its settings have a task
 /// and an autopilot, too.
 fn with_goal_of_problem() -> (Robot, Vec<Output>) {
+    let mut robot = waiting_with_goal_of_problem(None);
+    let outputs = robot.ready(|_| "fd_unground");
+    (robot, outputs)
+}
+
+fn waiting_with_goal_of_problem(journal: Option<&Path>) -> Robot {
     let autopilot = "[autopilot]\ntopic = \"/state\"\nmode = \"GUIDED\"\n";
     let task = "[tasks.round]\ngoal = \"(inspected shelf_1)\"\n";
     let settings = extended("nav2/mission.toml", &[autopilot, task].concat());
-    let mut robot = Robot::waiting(control_of("nav2/mission.toml").0, settings, None);
-    let outputs = robot.ready(|_| "fd_unground");
-    (robot, outputs)
+    Robot::waiting(control_of("nav2/mission.toml").0, settings, journal)
+}
+
+/// Lets ten minutes pass in which the robot must not be called.
+fn wait_quietly(robot: &mut Robot) {
+    let action = robot.machine.control().beliefs().running().map(|(number, _)| number);
+    for _ in 0..600 {
+        robot.now += Duration::from_secs(1);
+        assert_eq!(robot.handle(Input::Tick), []);
+    }
+    assert_eq!(robot.machine.control().beliefs().running().map(|(number, _)| number), action);
+    assert_eq!(robot.machine.state(), State::Execute);
 }
 
 #[test]
@@ -479,6 +521,38 @@ fn no_action_begins_while_the_autopilot_does_not_obey() {
     assert_eq!(robot.autopilot("MANUAL"), [], "it is stopped once");
     let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
     assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
+    wait_quietly(&mut robot);
+    assert_eq!(performed(&robot.autopilot("GUIDED")), ["move"]);
+    assert_eq!(robot.autopilot("GUIDED"), [], "it begins once");
+    let outputs = robot.handle(Input::Performed(2, Ended::Succeeded));
+    let outputs = robot.obey(outputs);
+    assert!(matches!(outputs[..], [Output::Perform(3, _)]), "{outputs:?}");
+}
+
+#[test]
+fn no_action_begins_if_the_autopilot_does_not_obey_at_the_start() {
+    let mut robot = waiting_with_goal_of_problem(None);
+    assert_eq!(robot.autopilot("MANUAL"), []);
+    let outputs = robot.ready(|_| "fd_unground");
+    assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
+    wait_quietly(&mut robot);
+    assert_eq!(performed(&robot.autopilot("GUIDED")), ["move"]);
+}
+
+#[test]
+fn an_action_of_the_previous_run_is_stopped_if_the_autopilot_does_not_obey() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut robot = waiting_with_goal_of_problem(Some(directory.path()));
+    let outputs = robot.ready(|_| "fd_unground");
+    assert_eq!(performed(&robot.obey(outputs)), ["move"]);
+    let modes = robot.machine.modes.clone();
+    drop(robot);
+    let mut robot = waiting_with_goal_of_problem(Some(directory.path()));
+    robot.handle(Input::Ready(modes.into_iter().map(|(function, mode)| (function, Some(mode))).collect()));
+    assert_eq!(robot.autopilot("MANUAL"), [Output::Stop(1)]);
+    let outputs = robot.handle(Input::Performed(1, Ended::Cancelled));
+    assert_eq!(performed(&robot.obey(outputs)), Vec::<&str>::new());
+    wait_quietly(&mut robot);
     assert_eq!(performed(&robot.autopilot("GUIDED")), ["move"]);
 }
 
@@ -621,6 +695,7 @@ fn a_task_that_is_cancelled_before_the_functions_are_found_is_not_carried_out() 
     assert_eq!(robot.cancel("search_pipeline"), []);
     let outputs = robot.ready(searching);
     assert_eq!(performed(&outputs), Vec::<&str>::new());
+    assert_eq!(stopped(&outputs), [1], "a node may still perform it");
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     let outputs = robot.obey(outputs);
     assert!(outputs.contains(&Output::Reply(8, true)), "{outputs:?}");
@@ -644,6 +719,7 @@ fn an_action_that_was_being_cancelled_is_not_repeated_after_a_restart() {
     let mut outputs = robot.ready(searching);
     robot.now += Duration::from_secs(4);
     outputs.extend(robot.handle(Input::Tick));
+    assert_eq!(stopped(&outputs), [1], "a node may still perform it");
     assert_eq!(performed(&robot.obey(outputs)), ["recharge"]);
 }
 
