@@ -365,6 +365,8 @@ unlinked origin.json 's/"bindings":{}/"bindings":{"functiondesign":"class:Compon
 unlinked origin.json 's/"bindings":{}/"bindings":{"battery_usage":"cost"}/' 'rejected: not covered: the binding cost'
 unlinked origin.json 's/"bindings":{}/"bindings":{"battery_usage":"estimation:safety","Battery_usage":"estimation:battery_usage"}/' \
   'rejected: origin.json: a name occurs twice'
+unlinked origin.json 's|"changes"|"names":{"fd_aruco":"a","http://metacontrol.org/metaplan/ugv#fd_aruco":"b"},&|' \
+  'rejected: origin.json: an individual has two names'
 unlinked origin.json 's/(robot_at wp1)/(robot_at wp1) (not (fd_available fd_aruco))/' \
   'rejected: not covered: fd_available in the problem file'
 unlinked origin.json 's/(robot_at wp1)/(robot_at wp1) (fd_available fd_aruco)/' 'rejected: not covered: fd_available in the problem file'

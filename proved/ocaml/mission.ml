@@ -97,8 +97,9 @@ let read ~derive ?metric knowledge steps origin problem_text =
   let pairs name = match optional origin name with
     | None -> []
     | Some (Object fields) ->
-      (* Readers of JSON disagree about names that occur twice. *)
-      let names = List.map (fun (name, _) -> String.lowercase_ascii name) fields in
+      (* Readers of JSON disagree about names that occur twice. Those of PDDL symbols have no case. *)
+      let written symbol = if name = "bindings" then String.lowercase_ascii symbol else symbol in
+      let names = List.map (fun (symbol, _) -> written symbol) fields in
       if List.length (List.sort_uniq compare names) < List.length names then reject "origin.json: a name occurs twice";
       List.map (fun (name, value) -> name, string value) fields
     | Some _ -> reject "origin.json: names are expected" in

@@ -219,8 +219,9 @@ impl Keeper {
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);
-        // The time of a line that cannot be understood may be a time of day.
-        let stated_time = observation.time.filter(|_| observation.events.iter().any(Result::is_ok));
+        // The first time of a session may be a time of day in a line that cannot be understood.
+        let counts = self.has_times || observation.events.iter().any(Result::is_ok);
+        let stated_time = observation.time.filter(|_| counts);
         let (time, refusal_of_time) = time_of_line(self.now, now, stated_time);
         self.now = time;
         // A line that was received before must not have an effect again.

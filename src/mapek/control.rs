@@ -203,8 +203,9 @@ impl Loop {
         // Computed plans that no decision has recorded are obsolete.
         self.planner.computed.clear();
         self.beliefs.lines += u64::from(!observation.is_timer);
-        // The time of a line that cannot be understood may be a time of day.
-        let stated_time = observation.time.filter(|_| observation.events.iter().any(Result::is_ok));
+        // The first time of a session may be a time of day in a line that cannot be understood.
+        let counts = self.beliefs.has_times || observation.events.iter().any(Result::is_ok);
+        let stated_time = observation.time.filter(|_| counts);
         let (time, refusal_of_time) = time_of_line(self.beliefs.now, now, stated_time);
         self.beliefs.now = time;
         if let Some(refusal) =

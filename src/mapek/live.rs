@@ -95,11 +95,7 @@ impl Live {
     ) -> Option<ReplanOutcome> {
         if rebuild || matches!(self, Self::Untried) {
             let new_replanner = replanner(question.mission, question.problem, query.limits);
-            *self = match new_replanner {
-                Some(replanner) => Self::Ready(replanner),
-                None if query.limits.reached() => Self::Untried,
-                None => Self::Unsuited,
-            };
+            *self = new_replanner.map_or(Self::Unsuited, Self::Ready);
         }
         match self {
             Self::Ready(replanner) => Some(replanner.plan_aloud(query, report)),

@@ -142,7 +142,7 @@ pub struct Study {
     /// Directory of the study's file, which is the working directory of the runs.
     pub directory: PathBuf,
     /// Checksum of the study's command, generator, time limit and values, of the files whose paths are words of the
-    /// command or values of its options, of all files of missions among them, and of the program's version. It does not
+    /// command or values of its input options, of all files of missions among them, and of the program's version. It does not
     /// cover the imports of a knowledge base that the command names itself, the files of the generator, and files in
     /// `{dir}`.
     pub digest: String,
@@ -506,7 +506,8 @@ fn several(value: &Value) -> &[Value] {
 }
 
 /// Options whose values are files that a run reads. Files that runs write do not belong to the digest.
-const INPUT_OPTIONS: [&str; 11] = [
+const INPUT_OPTIONS: [&str; 12] = [
+    "mission",
     "adaptation",
     "assert",
     "catalog",

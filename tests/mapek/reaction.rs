@@ -325,6 +325,16 @@ fn a_wrong_time_is_refused() {
 }
 
 #[test]
+fn the_time_of_a_line_that_is_not_understood_counts_only_among_times() {
+    let mut ugv = with(|settings| settings);
+    feed(&mut ugv, r#"{"event":"tikc","time":43200}"#);
+    assert!(ugv.beliefs().now() < Duration::from_secs(10));
+    feed(&mut ugv, r#"{"event":"tick","time":50}"#);
+    feed(&mut ugv, r#"{"event":"tikc","time":60}"#);
+    assert_eq!(ugv.beliefs().now(), Duration::from_secs(60));
+}
+
+#[test]
 fn missed_deadlines_have_the_documented_outcomes() {
     let overdue = |answers: &[Answer]| {
         let outcome = |answer: &Answer| match answer {

@@ -308,12 +308,13 @@ fn no_theorem_is_named_for_a_rejected_certificate() {
 fn programs_open_only_files_that_were_read() {
     use std::os::unix::fs::symlink;
     let folder = tempfile::tempdir().expect("a folder");
-    let [stuck, front] = ["stuck", "front"].map(|name| {
+    let [stuck, designs, front] = ["stuck", "designs", "front"].map(|name| {
         let copy = folder.path().join(name);
         copy_folder(&root().join(STORED).join(name), &copy);
         copy
     });
     symlink("/dev/null", stuck.join("plan.txt")).expect("a link");
+    symlink("/dev/null", designs.join("front.txt")).expect("a link");
     let second = front.join("2");
     std::fs::remove_dir_all(&second).expect("removed");
     symlink(root().join(STORED).join("front/2"), &second).expect("a link");
@@ -321,6 +322,7 @@ fn programs_open_only_files_that_were_read() {
     add_stub(programs.path(), "metaplan-proved-front", "echo 'proved: the front has exactly these values: '");
     for (certificate, reason, status) in [
         (&stuck, "`plan.txt` does not belong to the certificate", 1),
+        (&designs, "`front.txt` does not belong to the certificate", 1),
         (&front, "2: there is no such directory", 30),
     ] {
         let outcome = with_stubs(&certificate.display().to_string(), &programs, &[]);

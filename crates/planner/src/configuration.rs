@@ -8,7 +8,8 @@
 //!
 //! The algorithm is dynamic programming over the functions with dominance pruning. A partial assignment is dominated
 //! if another one for these functions consumes no more of any budget and has a greater worth. At equal worth, the
-//! other one must also be preferred. Both must have selected the same designs that later functions can select, too. A
+//! other one must also be preferred. It must also be able to pay for the shared designs that only the dominated one
+//! has paid for; if such a design has a negative demand, both must have selected the same shared designs. A
 //! partial assignment is also pruned if a budget does not even suffice for the minimum consumption of the remaining
 //! functions. So is one with an upper bound on its completions that is less than the best known worth. This upper bound
 //! is a Lagrangian relaxation of the budgets, which is valid for any non-negative multipliers \[1\]. A subgradient
@@ -122,12 +123,20 @@ impl Label {
         label
     }
 
-    /// Returns `true` if each completion of `other` that respects the budgets is also one of this label.
-    /// `has_gain`: a design may have a negative demand, from which only its first selection gains.
-    fn is_as_free(&self, other: &Self, has_gain: bool) -> bool {
-        let is_paid =
-            if has_gain { self.shared == other.shared } else { self.shared.is_superset(&other.shared) };
-        is_paid && self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
+    /// Returns `true` if each completion of `other` that respects the budgets is also one of this label. `demands` are
+    /// the demands of the shared designs; `None` if one is negative, from which only its first selection gains.
+    fn is_as_free(&self, other: &Self, demands: Option<&BTreeMap<usize, Vec<BigInt>>>) -> bool {
+        let fits = |spent: &[BigInt]| spent.iter().zip(&other.spent).all(|(spent, allowed)| spent <= allowed);
+        let Some(demands) = demands else { return self.shared == other.shared && fits(&self.spent) };
+        if !fits(&self.spent) {
+            return false;
+        }
+        // This label may still have to pay for designs that the other one has paid for.
+        let mut spent = self.spent.clone();
+        for demands in other.shared.difference(&self.shared).filter_map(|design| demands.get(design)) {
+            spent.iter_mut().zip(demands).for_each(|(spent, demand)| *spent += demand);
+        }
+        fits(&spent)
     }
 }
 
@@ -321,8 +330,11 @@ impl Problem {
         limits: &Limits,
     ) -> Result<Vec<Option<usize>>, Interrupted> {
         let target: BigInt = &incumbent.worth << PRICE_BITS;
-        let mut demands = self.functions.iter().flatten().flat_map(|item| &item.demands);
-        let has_gain = demands.any(BigInt::is_negative);
+        let items = self.functions.iter().flatten();
+        let shared_demands: BTreeMap<usize, Vec<BigInt>> =
+            items.filter_map(|item| Some((item.shared?, item.demands.clone()))).collect();
+        let has_gain = shared_demands.values().flatten().any(BigInt::is_negative);
+        let shared_demands = (!has_gain).then_some(&shared_demands);
         let mut labels = vec![self.nothing()];
         let designs = self.functions.len().saturating_mul(size_of::<Option<usize>>());
         // The digits of a number are stored outside of it.
@@ -338,13 +350,14 @@ impl Problem {
                     let mut new = new?;
                     new.shared
                         .retain(|design| self.shared.get(design).is_some_and(|(_, last)| *last >= from));
-                    let is_worse = |old: &Label| old.worth >= new.worth && old.is_as_free(&new, has_gain);
+                    let is_worse =
+                        |old: &Label| old.worth >= new.worth && old.is_as_free(&new, shared_demands);
                     let is_hopeless = !self.fits(&new, from) || self.bound(&new, from, prices) < target;
                     if is_hopeless || next.iter().any(is_worse) {
                         continue;
                     }
                     // Of equally good labels (partial assignments), the older one is preferred and kept.
-                    next.retain(|old| old.worth >= new.worth || !new.is_as_free(old, has_gain));
+                    next.retain(|old| old.worth >= new.worth || !new.is_as_free(old, shared_demands));
                     next.push(new);
                     if next.len().saturating_mul(bytes) > limits.room() {
                         return Err(Interrupted);
@@ -549,7 +562,7 @@ mod tests {
         for has_component in [false, true] {
             let design = |identity| DesignChoice {
                 utility: number(1),
-                components: if has_component { vec![identity] } else { Vec::new() },
+                components: has_component.then_some(identity).into_iter().collect(),
                 identity: Some(identity),
                 ..DesignChoice::default()
             };
