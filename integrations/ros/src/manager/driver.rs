@@ -294,7 +294,8 @@ impl Driver {
             self.node.log(Severity::Debug, &format!("hears {input:?}"));
         }
         // Effects of actions and facts of tasks set values that may have been measured before.
-        let sets_values = matches!(input, Input::Performed(..) | Input::Progress(..) | Input::Request(..));
+        let sets_values = matches!(input, Input::Performed(..) | Input::Progress(..) | Input::Request(..))
+            || matches!(input, Input::Autopilot(_)) && self.machine.holds_requests();
         let outputs = self.machine.handle(input, now)?;
         if sets_values {
             self.robot.forget_measurements(|attribute| self.machine.measures_value(attribute));
@@ -358,8 +359,8 @@ fn last_autopilot_mode(delayed: &mut Vec<Input>) -> Option<Input> {
 }
 
 /// Returns the inputs that arrive until the node is active, `stop` is set, or there are [`MAX_DELAYED_INPUTS`]. Of the
-/// progress of an action and of the autopilot's mode, only the last report is returned. Calls `idle` at least every 50 ms, with the number of a
-/// request that must be refused, if there is one.
+/// progress of an action and of the autopilot's mode, only the last report is returned. Calls `idle` at least every
+/// 50 ms, with the number of a request that must be refused, if there is one.
 fn delayed_inputs(
     inputs: &Receiver<Input>,
     active: &AtomicBool,

@@ -12,7 +12,8 @@ const INCOMPLETE: &str = "the data end too early: the definition differs from th
 
 impl Structure {
     /// Returns the value of a field, or `None` for an element that a list does not have. NaN is null, and an infinite
-    /// number is the text `inf` or `-inf`. `offset` is the number of bytes of the message that precede `data`; the alignment depends on it.
+    /// number is the text `inf` or `-inf`. `offset` is the number of bytes of the message that precede `data`; the
+    /// alignment depends on it.
     ///
     /// # Errors
     /// The data are no message of this structure.

@@ -168,6 +168,11 @@ impl Machine {
         designs.iter().map(|design| self.settings.functions.mode(function, design).to_owned()).collect()
     }
 
+    /// Returns `true` if requests of tasks wait for the mode of the autopilot.
+    pub(super) fn holds_requests(&self) -> bool {
+        !self.held_requests.is_empty()
+    }
+
     /// Handles an input at the time `now` of the adaptation loop. Returns the outputs.
     ///
     /// # Errors
