@@ -273,15 +273,23 @@ fn violated(wishes: &Wishes, kept: &[&Offer]) -> Vec<String> {
 struct Offers<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
-    /// Number, components and estimations of each design, by IRI.
-    designs: BTreeMap<String, (Option<usize>, Vec<String>, BTreeMap<String, BigRational>)>,
+    /// Designs by IRI.
+    designs: BTreeMap<String, DesignEntry>,
+}
+
+#[derive(Default)]
+struct DesignEntry {
+    number: Option<usize>,
+    components: Vec<String>,
+    estimations: BTreeMap<String, BigRational>,
 }
 
 impl<'a> Offers<'a> {
     fn new(knowledge: &'a Knowledge, wishes: &'a Wishes) -> Self {
         let designs = knowledge.view().function_designs().into_iter().enumerate().map(|(number, design)| {
             let components = design.components.into_iter().map(|component| component.name).collect();
-            (design.individual.iri, (Some(number), components, design.estimations))
+            let entry = DesignEntry { number: Some(number), components, estimations: design.estimations };
+            (design.individual.iri, entry)
         });
         Self { knowledge, wishes, designs: designs.collect() }
     }
@@ -295,10 +303,10 @@ impl<'a> Offers<'a> {
             self.knowledge.runtime().candidates(&objective.individual.iri, attribute);
         let candidates_of_objective =
             candidates_of_objective.map_err(|error| Message::from_ontology(&error))?;
-        let nothing = (None, Vec::new(), BTreeMap::new());
+        let unknown = DesignEntry::default();
         let offer = |candidate: ontology::runtime::Candidate| {
-            let (identity, components, estimations) =
-                self.designs.get(&candidate.design.iri).unwrap_or(&nothing);
+            let DesignEntry { number, components, estimations } =
+                self.designs.get(&candidate.design.iri).unwrap_or(&unknown);
             // The optimizer maximises, so the sign of a minimised attribute is changed.
             let worth = candidate.utility;
             let utility = if matches!(self.wishes.worth, Worth::Least(_)) { -worth } else { worth };
@@ -311,7 +319,7 @@ impl<'a> Offers<'a> {
                 utility: utility.clone(),
                 demands: self.wishes.budgets.iter().map(demand).collect(),
                 components: used.map(|(number, _)| number).collect(),
-                identity: *identity,
+                identity: *number,
             };
             let (design, components) = (candidate.design.name, components.clone());
             let missed = candidate.missed.iter().map(requirement_text).collect();

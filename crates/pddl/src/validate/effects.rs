@@ -90,7 +90,9 @@ impl<'p> Evaluator<'_, 'p> {
     ) {
         match effect {
             Effect::And(parts) => {
-                parts.iter().for_each(|part| self.collect_defined(part, bindings, changes));
+                for part in parts {
+                    self.collect_defined(part, bindings, changes);
+                }
             }
             Effect::ForAll(variables, body) => {
                 self.world.each(variables, bindings, &mut |bindings| {

@@ -161,7 +161,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         if let Some(duration) = step.text.duration.as_ref().or(exact.as_ref()) {
             let slack = self.slack(exact.is_none() && duration.is_zero());
             for (operator, bound) in &bounds {
-                self.check_duration(step, time, (*operator, bound), duration, &slack)?;
+                Self::check_duration(step, time, (*operator, bound), duration, &slack)?;
             }
         }
         let duration = exact.or_else(|| step.text.duration.clone()).or_else(|| self.chosen_duration(&bounds));
@@ -240,7 +240,6 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 
     fn check_duration(
-        &self,
         step: &Step<'p>,
         time: &BigRational,
         (operator, bound): (Comparison, &BigRational),
@@ -320,7 +319,7 @@ impl<'e, 'p> Execution<'e, 'p> {
                 .value(&constraint.expression, &running.instance.bindings)
                 .map_err(|undefined| undefined_violation(running.step, time, &undefined))?;
             let required = (constraint.operator, &bound);
-            self.check_duration(running.step, time, required, &running.duration, &slack)?;
+            Self::check_duration(running.step, time, required, &running.duration, &slack)?;
         }
         Ok(())
     }
