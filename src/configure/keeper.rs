@@ -219,10 +219,7 @@ impl Keeper {
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.lines += u64::from(!observation.is_timer);
-        // The first time of a session may be a time of day in a line that cannot be understood.
-        let counts = self.has_times || observation.events.iter().any(Result::is_ok);
-        let stated_time = observation.time.filter(|_| counts);
-        let (time, refusal_of_time) = time_of_line(self.now, now, stated_time);
+        let (time, refusal_of_time) = time_of_line(self.now, now, observation, self.has_times);
         self.now = time;
         // A line that was received before must not have an effect again.
         if let Some(refusal) = observation.sequence.and_then(|seq| self.numbers.refused(seq)) {

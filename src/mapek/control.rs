@@ -45,19 +45,25 @@ const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
 const NANOSECONDS_PER_MICROSECOND: u32 = 1000;
 
 /// Returns the time at which a line is handled. `previous` is the time of the previous line, `now` the time of the
-/// clock, and `own` the time that the line states. The time of the clock is used if the line states none. If the stated
-/// time is too late (see [`MAX_TIME_STEP`]), it is ignored, and an error is returned, too. The returned time is never
-/// before `previous`. It is in whole microseconds, as in snapshots, so that a restored loop decides in the same way.
+/// clock, and `has_times` states whether earlier lines had times. The time of the clock is used if the line states no
+/// time. It is also used if the line is not understood and earlier lines had no times, because its time may be a time
+/// of day. If the stated time is too late (see [`MAX_TIME_STEP`]), it is ignored, and an error is returned, too. The
+/// returned time is never before `previous`. It is in whole microseconds, as in snapshots, so that a restored loop
+/// decides in the same way.
 pub(crate) fn time_of_line(
     previous: Duration,
     now: Duration,
-    own: Option<Duration>,
+    observation: &Observation,
+    has_times: bool,
 ) -> (Duration, Option<Answer>) {
+    let counts = has_times || observation.events.iter().any(Result::is_ok);
+    let stated_time = observation.time.filter(|_| counts);
     let microseconds =
         |time: Duration| Duration::new(time.as_secs(), time.subsec_micros() * NANOSECONDS_PER_MICROSECOND);
-    let (previous, now, own) = (microseconds(previous), microseconds(now), own.map(microseconds));
+    let (previous, now, stated_time) =
+        (microseconds(previous), microseconds(now), stated_time.map(microseconds));
     let latest = previous.max(now).saturating_add(MAX_TIME_STEP);
-    match own {
+    match stated_time {
         Some(time) if time > latest => {
             let message = format!(
                 "`time` is {} s, but may be at most {} s: it is in seconds since the start of the mission and may \
@@ -67,7 +73,7 @@ pub(crate) fn time_of_line(
             );
             (previous.max(now), Some(Answer::Error { code: "M308".to_owned(), message }))
         }
-        own => (previous.max(own.unwrap_or(now)), None),
+        stated_time => (previous.max(stated_time.unwrap_or(now)), None),
     }
 }
 
@@ -203,10 +209,8 @@ impl Loop {
         // Computed plans that no decision has recorded are obsolete.
         self.planner.computed.clear();
         self.beliefs.lines += u64::from(!observation.is_timer);
-        // The first time of a session may be a time of day in a line that cannot be understood.
-        let counts = self.beliefs.has_times || observation.events.iter().any(Result::is_ok);
-        let stated_time = observation.time.filter(|_| counts);
-        let (time, refusal_of_time) = time_of_line(self.beliefs.now, now, stated_time);
+        let has_times = self.beliefs.has_times;
+        let (time, refusal_of_time) = time_of_line(self.beliefs.now, now, observation, has_times);
         self.beliefs.now = time;
         if let Some(refusal) =
             observation.sequence.and_then(|sequence| self.beliefs.numbers.refused(sequence))

@@ -54,13 +54,8 @@ impl Reading {
     }
 }
 
-pub(super) fn verdict_of(
-    mission: &Mission,
-    problem: &Problem,
-    plan: &Plan,
-    reading: &Reading,
-    limits: &Limits,
-) -> Result<Verdict, Interrupted> {
+/// Returns a plan as the validator reads it, with all starts and durations.
+pub(crate) fn plan_text(plan: &Plan) -> PlanText {
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
         arguments: step.arguments.iter().map(|argument| Name::new(argument)).collect(),
@@ -68,8 +63,17 @@ pub(super) fn verdict_of(
         duration: Some(step.duration.to_rational()),
         line: 0,
     });
-    let plan = PlanText { steps: steps.collect() };
-    validate_within(mission.domain(), problem, &plan, &reading.options, &|| limits.reached())
+    PlanText { steps: steps.collect() }
+}
+
+pub(super) fn verdict_of(
+    mission: &Mission,
+    problem: &Problem,
+    plan: &Plan,
+    reading: &Reading,
+    limits: &Limits,
+) -> Result<Verdict, Interrupted> {
+    validate_within(mission.domain(), problem, &plan_text(plan), &reading.options, &|| limits.reached())
 }
 
 /// Checks a plan by executing it with the independent validator. `problem` was returned by

@@ -16,6 +16,7 @@ mod steps;
 pub use ::mission::{Bindings, CoAdaptation, Mission, Names, ParsedObjective, unused_measurement};
 pub use blocking::{Blocking, blocking};
 pub use btcpp::{btcpp_text, first_wait};
+pub(crate) use confirm::plan_text;
 pub use confirm::{Reading, Unconfirmed, confirm};
 pub use lean::lean;
 pub use planning::Planning;

@@ -4,11 +4,11 @@
 use std::collections::BTreeMap;
 
 use num_rational::BigRational;
-use pddl::ast::Name;
-use pddl::validate::{Course, CourseMoment, NumberBound, PlanStep, PlanText, course, metric_after};
+use pddl::validate::{Course, CourseMoment, NumberBound, course, metric_after};
 use picture::{Axis, Bound, Curve, Step};
 use planner::Plan;
 
+use crate::mission::plan_text;
 use crate::number;
 use crate::report::seen::Scene;
 
@@ -16,17 +16,9 @@ pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) 
     if steps.is_empty() {
         return Vec::new();
     }
-    let text = plan.steps.iter().map(|step| PlanStep {
-        action: Name::new(&step.action),
-        arguments: step.arguments.iter().map(|argument| Name::new(argument)).collect(),
-        start: Some(step.start.to_rational()),
-        duration: Some(step.duration.to_rational()),
-        line: 0,
-    });
-    let text = PlanText { steps: text.collect() };
     // The validator has executed the plan before, so executing it again is expected to succeed. Otherwise, only
     // the cost is drawn.
-    let course = course(scene.domain, scene.problem, &text).unwrap_or_default();
+    let course = course(scene.domain, scene.problem, &plan_text(plan)).unwrap_or_default();
     let points = metric(scene, plan, &course, axis).unwrap_or_else(|| spent(plan, steps, axis));
     let cost = Curve { name: "cost".to_owned(), points, bounds: Vec::new() };
     std::iter::once(cost).chain(numbers(&course, steps, axis)).collect()
